@@ -35,7 +35,9 @@ ALLOWED = {
         "study",
         "sweeping",
         "table1",
+        "templates",
         "validity",
+        "verifying",
         "vibration",
     },
     "live": {
@@ -133,6 +135,10 @@ ALLOWED = {
         "study",
     },
     "sweeping": {"study", "report", "outputs"},
+    "verifying": {"models", "outputs", "potential", "problem", "report", "showing", "solution", "solvers", "study"},
+    "templates": set(),
+    "versions": set(),
+    "showing": {"comparison", "mesh", "outputs", "potential", "report", "solution", "units"},
     "study": {
         "outputs",
         "refining",
@@ -288,6 +294,8 @@ ALLOWED = {
 OPEN_TO_ALL = {
     *("arrays", "completing", "deprecation", "errors", "memory", "opening", "kernels", "remembering", "plugins"),
 }
+# The room that methods import when they are called, to show or write a value: it is above their own.
+SHOWING = "truespring.showing."
 HEAVY = {
     "matplotlib",
     "pyvista",
@@ -304,6 +312,11 @@ HEAVY = {
     "dask",
     "distributed",
     "polars",
+    "pandas",
+    "xarray",
+    "h5py",
+    "meshio",
+    "IPython",
     "starlette",
     "uvicorn",
     "websockets",
@@ -324,7 +337,10 @@ def imported(file: Path, everywhere: bool = True, modules: frozenset[str] = froz
     """Dotted names that a file imports, at its top only or everywhere; of a package those `modules` that it names."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
     names: set[str] = set()
+    thin = {id(method.body[-2]) for method in thin_methods(tree)}
     for node in ast.walk(tree) if everywhere else tree.body:
+        if id(node) in thin:
+            continue
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -332,6 +348,46 @@ def imported(file: Path, everywhere: bool = True, modules: frozenset[str] = froz
             parts = {f"{node.module}.{alias.name}" for alias in node.names} & modules
             names |= parts or {node.module}
     return names
+
+
+def thin_methods(tree: ast.Module) -> list[ast.FunctionDef]:
+    """Methods that only show a value: a docstring, an import of a function of SHOWING, and its call."""
+    return [
+        method
+        for value in ast.walk(tree)
+        if isinstance(value, ast.ClassDef)
+        for method in value.body
+        if isinstance(method, ast.FunctionDef) and is_thin(method)
+    ]
+
+
+def is_thin(method: ast.FunctionDef) -> bool:
+    if len(method.body) != 3 or ast.get_docstring(method) is None:
+        return False
+    _, imports, call = method.body
+    if not (isinstance(imports, ast.ImportFrom) and (imports.module or "").startswith(SHOWING)):
+        return False
+    return (
+        len(imports.names) == 1
+        and isinstance(call, ast.Return)
+        and isinstance(call.value, ast.Call)
+        and isinstance(call.value.func, ast.Name)
+        and call.value.func.id == imports.names[0].name
+    )
+
+
+def test_methods_that_show_a_value_only_call_the_room_on_top() -> None:
+    """What `imported` leaves out: the import of a thin method, no other import of this room."""
+    found = {
+        (file.stem, method.name)
+        for files in rooms().values()
+        for file in files
+        for method in thin_methods(ast.parse(file.read_text(encoding="utf-8")))
+    }
+    assert found >= {("solution", "plot"), ("solution", "write"), ("mesh", "to_pyvista"), ("mesh", "from_pyvista")}
+    more = "class A:\n def plot(self):\n  'Plot.'\n  from truespring.showing.plotting import plot\n"
+    for end, thin in (("return plot(self)", True), ("return plot(self) + 1", False), ("return draw(self)", False)):
+        assert bool(thin_methods(ast.parse(f"{more}  {end}"))) == thin
 
 
 def test_imports_run_one_way() -> None:
@@ -427,7 +483,7 @@ def test_what_is_imported_is_a_declared_dependency() -> None:
     extras = project["optional-dependencies"]
     declared = [*project["dependencies"], *(one for name in extras.keys() - {"test"} for one in extras[name])]
     modules = {"scikit-fem": "skfem", "lazy-loader": "lazy_loader", "ansys-mapdl-reader": "ansys", "pillow": "PIL"}
-    modules |= {"imageio-ffmpeg": "imageio_ffmpeg"}
+    modules |= {"imageio-ffmpeg": "imageio_ffmpeg", "ipython": "IPython"}
     names = [re.split("[<>=]", one)[0] for one in declared]
     allowed = {modules.get(name, name) for name in names} | {"truespring", *sys.stdlib_module_names}
     for files in rooms().values():

@@ -278,7 +278,7 @@ def test_a_body_that_pushes_does_not_look_like_one_that_pulls(way: int, page_of:
     direction = "x" if way > 0 else "−x"
     parts = ("force", f"along {direction}:", f"linear FEM {size},", f"a spring let go −{size} (200 %")
     assert in_order(force_sentence(found) or "", *parts)
-    data = json.loads(page_of(found).scripts[0])
+    data = page_of(found).data
     assert data["motion"] and [one["force"][-1] for one in data["paths"]] == [size, f"−{size}"]
 
 
@@ -565,7 +565,7 @@ def test_magnified_pictures_say_so_and_show_it(page_of: Callable[[Result], "Page
     page = page_of(found)
     assert "displacements × 50" in page.said
     assert page.tags.count("canvas") == 1
-    data = json.loads(page.scripts[0])
+    data = page.data
     assert data["box"][1] == pytest.approx(20 + 50 * 0.1)
     plain = result(moved_by(problem, 4e-3, kind="springs", label="springs"), {"linear": moved_by(problem, 1e-4)})
     texts = words(draw_figures(plain)[over_name(plain, "linear")])
@@ -585,7 +585,7 @@ def test_a_surface_is_magnified_only_where_its_displacement_is_known(page_of: Ca
         figure = draw_figures(found)[over_name(found, "ansys")]
         (dot,) = called(figure, "probe")
         assert np.ravel(dot.get_data()) == pytest.approx([80, factor * 0.08])
-        data = json.loads(page_of(found).scripts[0])
+        data = page_of(found).data
         assert (data["magnified"] == "") == (factor == 1)
         assert (data["paths"][1]["surface"] is None) == (factor > 1)
 
@@ -607,7 +607,7 @@ def test_the_picture_follows_the_body_and_the_model_not_a_reference_that_goes_fa
         (drawn,) = called(figure, "reference")
         assert drawn.get_clip_path() is not None or drawn.get_clip_box() is not None
     assert heights["near"] > 120 and 60 < heights["far"] < 80  # mm
-    data = json.loads(page_of(found).scripts[0])
+    data = page_of(found).data
     assert data["box"] == pytest.approx([80, 120])
     assert [one["beyond"] for one in data["paths"]] == [False, False, True]
     steps = np.frombuffer(base64.b64decode(data["paths"][2]["positions"][-1]), dtype="<f4").reshape(-1, 2)
@@ -702,6 +702,11 @@ class Page(HTMLParser):
         self._in_tag = False
         self.feed(text)
 
+    @property
+    def data(self) -> Any:
+        """The data of the first interactive view."""
+        return json.loads(next(script for script in self.scripts if script.startswith("{")))
+
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         values = {name: value or "" for name, value in attrs}
         self.tags.append(tag)
@@ -725,7 +730,9 @@ def test_page_loads_nothing_and_escapes_what_it_was_given(solved: Result, tmp_pa
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     page = Page(text)
     assert len(page.loaded) == 2 * 6 and all(address.startswith("data:image/") for address in page.loaded)
-    assert page.links and all(link.removeprefix("#") in page.ids for link in page.links)
+    own = [link for link in page.links if link.startswith("#")]
+    assert own and all(link.removeprefix("#") in page.ids for link in own)
+    assert all(link.startswith("data:text/csv;base64,") for link in set(page.links) - set(own))
     assert page.policy.startswith("default-src 'none';")
     assert not {"link", "iframe", "object", "embed", "base"} & set(page.tags)
     assert "url(" not in "".join(page.said) and "@import" not in text
@@ -815,7 +822,7 @@ def test_a_model_that_failed_shows_its_advice(solved: Result) -> None:
 
 def test_the_viewer_holds_the_positions_of_every_level(solved: Result) -> None:
     page = Page(render_page([solved], ""))
-    data = json.loads(page.scripts[0])
+    data = page.data
     assert [one["name"] for one in data["paths"]] == ["springs", "linear", "a/b"]
     assert data["paths"][0]["levels"] == solved.paths["springs"].load_factors.tolist()
     clouds = [solved.problem.mesh.nodes, *(state.positions for one in solved.paths.values() for state in one.states)]

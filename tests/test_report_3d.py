@@ -2,7 +2,6 @@
 
 import base64
 import importlib.util
-import json
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -516,12 +515,12 @@ def test_the_bundle_is_part_of_pages_with_a_body_in_3d_alone(page_of: Callable[.
     )
     only = ts.solve(plane, ts.Fem("linear"), ts.Newton(load_steps=2))
     flat = Result("Flat", FilePath("flat.toml"), plane, {"linear": only}, 1, "linear", {}, 0.05, "")
-    assert len(scripts(page_of(flat))) == 2  # the data, and what draws them
+    assert len(scripts(page_of(flat))) == 4  # the two of every page, the data, and what draws them
     both = scripts(page_of(result(body()), flat))
-    assert [script == bundle().strip() for script in both] == [False, False, True, False]
+    assert [script == bundle().strip() for script in both] == [False, False, False, False, True, False]
     still = result(body(), references={})
     still = replace(still, paths={"springs": path(body(), 1.0, levels=(0.0,), kind="springs", label="springs")})
-    assert len(scripts(page_of(still))) == 1  # nothing turns
+    assert len(scripts(page_of(still))) == 3  # nothing turns
 
 
 def test_a_page_in_3d_loads_nothing(page_of: Callable[..., Page]) -> None:
@@ -533,7 +532,7 @@ def test_a_page_in_3d_loads_nothing(page_of: Callable[..., Page]) -> None:
     assert addresses <= {"http://www.w3.org/1999/xhtml"}  # a name, which is not fetched
     for word in ("fetch(", "XMLHttpRequest", "WebSocket", "importScripts", "import(", "eval("):
         assert word not in bundle().replace(".import(", "")
-    data = json.loads(page.scripts[0])
+    data = page.data
     assert len(data["box"]) == 3 and "canvas" in page.tags
 
 
@@ -578,7 +577,7 @@ def test_a_body_too_large_for_a_page_says_where_its_levels_are(
 ) -> None:
     monkeypatch.setattr("truespring.report.page._BUDGET", 100)
     page = page_of(result(body()))
-    assert in_order(told(page), "too large", ".pvd", "ParaView") and len(scripts(page)) == 1
+    assert in_order(told(page), "too large", ".pvd", "ParaView") and len(scripts(page)) == 3
 
 
 # --- files ----------------------------------------------------------------------------------------

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +18,11 @@ from truespring.potential import Potential
 from truespring.problem import Problem
 from truespring.reactions import SupportForce, leading_support, support_forces
 from truespring.solvers import Cost
+
+if TYPE_CHECKING:
+    import pyvista
+    import xarray
+    from matplotlib.axes import Axes
 
 #: Levels closer than this are equal: other programs print six digits.
 SAME_LEVEL = 2e-6
@@ -250,3 +257,99 @@ class Solution:
             return state.applied_force
         of_leading = [one.force for one in self.support_forces(state) if one.support == self._leading]
         return of_leading[0] if of_leading else np.full(self.problem.mesh.dim, math.nan)
+
+    def write(self, file: str | Path, level: int = -1) -> Path:
+        """Write the solution to a file, in SI units; its suffix selects the format.
+
+        .pvd: all states, one .vtu each, for ParaView, as `truespring verify` writes them. .vtu: the state `level`.
+        .stl: the deformed body of the last state. .csv: the table of `table`, with units in the header line.
+
+        Args:
+            file: the file; its folder is created.
+            level: number of the state of a .vtu file, counted from the end if negative.
+
+        Returns the path of the file. Raises OutputError for another suffix or level.
+        """
+        from truespring.showing.writing import write_solution
+
+        return write_solution(self, Path(file), level)
+
+    def to_pyvista(self, level: int = -1, warped: bool = True) -> "pyvista.UnstructuredGrid":
+        """Return a state as a grid of PyVista with the fields of the .vtu files.
+
+        Points have `displacement` [m] and `reaction` [N]; springs have `tension` [N], `stretch` [-] and `stiffness`
+        [N/m], elements `stress` [Pa] and `strain_energy` [J], as far as the model has them; NaN elsewhere.
+
+        Args:
+            level: number of the state, counted from the end if negative.
+            warped: whether points are the deformed positions [m]; else the undeformed ones.
+
+        Raises OutputError if there is no such state or PyVista is not installed.
+        """
+        from truespring.showing.grids import solution_grid
+
+        return solution_grid(self, level, warped)
+
+    def table(self, probe: int | None = None) -> Any:
+        """Return a table with one row for each state: a pandas DataFrame, of polars if pandas is not installed.
+
+        Columns: load_factor, in a motion time [s], displacement of the probe ux, uy[, uz] [m], applied force fx, fy[,
+        fz] [N], energy [J], smallest and largest stretch of the springs, area_ratio, iterations, residual, and state:
+        stable, unstable or the kind of a critical point. The units are in `attrs["units"]` of a pandas table.
+
+        Args:
+            probe: number of a node; by default the node that moves most.
+
+        Raises OutputError if neither library is installed, or the solution has no states.
+        """
+        from truespring.showing.tables import table_of
+
+        return table_of(self, probe)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the states as arrays over level, node and component; units are in the attributes.
+
+        Raises OutputError if xarray is not installed or the solution has no states.
+        """
+        from truespring.showing.tables import arrays_of
+
+        return arrays_of(self)
+
+    def plot(
+        self,
+        over: "Solution | None" = None,
+        color: str | None = None,
+        level: int = -1,
+        ax: "Axes | None" = None,
+        magnify: float | None = None,
+    ) -> "Axes":
+        """Draw a state by matplotlib: springs in blue over a reference in black, or in colours.
+
+        Data of the axes are in metres, numbers are written in a unit that fits. In space the body is an image.
+
+        Args:
+            over: a reference, such as a solution by finite elements.
+            color: "distance" from the reference, "displacement", "stretch", "stress" (von Mises) or "tension".
+            level: number of the state, counted from the end if negative; with a reference, among the states at levels
+                that both have.
+            ax: axes to draw in; by default those of a new figure.
+            magnify: factor of the displacements, by default 1 unless they are too small to see.
+
+        Returns the axes. Raises OutputError if the solution does not have the level or the quantity.
+        """
+        from truespring.showing.plotting import plot_solution
+
+        return plot_solution(self, over, color, level, magnify, ax)
+
+    def animate(self, file: str | Path, over: "Solution | None" = None) -> Path:
+        """Write an animation of the states as .gif or .mp4.
+
+        Args:
+            file: the file; its folder is created. MP4 needs imageio-ffmpeg.
+            over: a reference, drawn in black.
+
+        Returns the path of the file. Raises OutputError for another suffix, fewer than two levels, or if ffmpeg fails.
+        """
+        from truespring.showing.films import animate
+
+        return animate(self, Path(file), over)

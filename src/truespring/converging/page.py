@@ -10,7 +10,7 @@ from truespring.converging.settling import Refinement, Settling
 from truespring.report.drawing import drawings
 from truespring.report.plots import Curve, plot
 from truespring.report.sheet import Sheet
-from truespring.report.shell import picture, render
+from truespring.report.shell import pictures, render
 from truespring.report.style import SPRING_STYLES
 from truespring.report.tables import new_table
 
@@ -53,7 +53,7 @@ def render_settling(title: str, file: Path, found: Refinement, command: str | No
             for one in found.attempts
             if not one.sound
         ],
-        pictures=[picture(drawing) for drawing in drawings(settling_figures(found)).values()],
+        pictures=pictures(drawings(settling_figures(found)), file.stem),
         rows=list(settling_rows(found)),
     )
 

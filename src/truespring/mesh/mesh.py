@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -19,6 +19,9 @@ from truespring.mesh.forms import Forms, find_forms
 from truespring.mesh.kinds import ELEMENT_KINDS, MIXED, ElementKind, Links
 from truespring.mesh.merged import mixed_table, unmerged, width
 from truespring.mesh.rows import ascending, distinct_rows
+
+if TYPE_CHECKING:
+    import pyvista
 
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
 # dimension: elements a thousand times longer than wide, as shapes allow, are well above.
@@ -111,6 +114,45 @@ class Mesh:
         if not there:
             raise MeshError("a mesh without elements is empty")
         return cls(nodes, mixed_table(there), MIXED, node_groups, element_groups, facet_groups, notes)
+
+    @classmethod
+    def from_pyvista(cls, grid: "pyvista.DataSet", unit: str | float = "m", join: bool | None = None) -> "Mesh":
+        """Return the mesh of a data set of PyVista, by the rules of `read_mesh` for VTK files.
+
+        Args:
+            grid: unstructured grid, image, structured grid or surface.
+            unit: unit of its points, such as "mm"; a number is in metres.
+            join: whether to merge coincident nodes; by default only if no two elements share a node.
+
+        Raises MeshError if the grid contains no body.
+        """
+        from truespring.showing.reading import mesh_of_pyvista
+
+        return mesh_of_pyvista(grid, unit, join)
+
+    @classmethod
+    def from_meshio(cls, mesh: Any, unit: str | float = "m", join: bool | None = None) -> "Mesh":
+        """Return the mesh of a `meshio.Mesh`, by the rules of `read_mesh`.
+
+        Args:
+            mesh: a mesh of meshio.
+            unit: unit of its points, such as "mm"; a number is in metres.
+            join: whether to merge coincident nodes; by default only if no two elements share a node.
+
+        Raises MeshError if the mesh contains no body.
+        """
+        from truespring.showing.reading import mesh_of_meshio
+
+        return mesh_of_meshio(mesh, unit, join)
+
+    def to_pyvista(self) -> "pyvista.UnstructuredGrid":
+        """Return the mesh as a grid of PyVista [m]; groups are arrays of truth values, named as the groups.
+
+        Raises OutputError if PyVista is not installed.
+        """
+        from truespring.showing.grids import mesh_grid
+
+        return mesh_grid(self)
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):

@@ -35,24 +35,28 @@ def write_animation(result: Result, folder: Path) -> str:
 
     Frames show the recorded states, at most FRAMES of them.
     """
-    reel = reel_of(result, shown_reference(result), FRAMES, from_rest=True)
+    reel = whole_reel(result)
     if reel is None:
         return "no animation: fewer than two levels are known"
-    frames = _frames(reel)
-    pause = int(np.clip(1000 * _LASTS / len(frames), _SHORTEST, _LONGEST)) // 10 * 10  # a GIF counts 10 ms
-    _write_gif(frames, folder / "animation.gif", pause, _COLORS[reel.mesh.dim])
+    frames = frames_of(reel)
+    write_gif(reel, frames, folder / "animation.gif")
     if importlib.util.find_spec("imageio_ffmpeg") is None:
         return NO_VIDEO
     film = folder / "animation.mp4"
     try:
-        _write_mp4(frames, film, 1000 / pause)
+        write_mp4(frames, film)
     except (OSError, RuntimeError) as error:  # its program ffmpeg is missing, or failed
         film.unlink(missing_ok=True)
         return f"no animation.mp4: ffmpeg failed: {one_line(str(error))}"
     return ""
 
 
-def _frames(reel: Reel) -> list[NDArray[np.uint8]]:
+def whole_reel(result: Result) -> Reel | None:
+    """Return the instants of an animation from rest; None if fewer than two levels are known."""
+    return reel_of(result, shown_reference(result), FRAMES, from_rest=True)
+
+
+def frames_of(reel: Reel) -> list[NDArray[np.uint8]]:
     """Return the frames, shape (height, width, 3) each, all of one size with even numbers of pixels."""
     each = _size(shots(reel, 1, reel.levels[:1], _DPI))
     many = max(1, _MOST // each) if each else len(reel.levels)
@@ -78,11 +82,17 @@ def _drawn(reel: Reel, levels: Sequence[float]) -> Iterator[NDArray[np.uint8]]:
         yield np.ascontiguousarray(pixels[:height, :width])
 
 
-def _write_gif(frames: list[NDArray[np.uint8]], file: Path, pause: int, colors: int) -> None:
-    """Write frames of `pause` [ms] each; the last one stays longer. `colors` beyond those of lines are kept."""
+def _pause(n_frames: int) -> int:
+    """Return how long a frame is shown [ms]."""
+    return int(np.clip(1000 * _LASTS / n_frames, _SHORTEST, _LONGEST)) // 10 * 10  # a GIF counts 10 ms
+
+
+def write_gif(reel: Reel, frames: list[NDArray[np.uint8]], file: Path) -> None:
+    """Write the frames of a reel as GIF; the last one stays longer. The colours of lines are kept, and few others."""
     from PIL import Image
 
-    palette = _palette(frames[len(frames) // 2], colors)
+    pause = _pause(len(frames))
+    palette = _palette(frames[len(frames) // 2], _COLORS[reel.mesh.dim])
     first, *others = [Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
     pauses = [pause] * (len(frames) - 1) + [max(pause, 800)]
     first.save(file, save_all=True, append_images=others, duration=pauses, loop=0, optimize=True)
@@ -100,12 +110,13 @@ def _palette(frame: NDArray[np.uint8], colors: int) -> "Image.Image":
     return palette
 
 
-def _write_mp4(frames: list[NDArray[np.uint8]], file: Path, per_second: float) -> None:
+def write_mp4(frames: list[NDArray[np.uint8]], file: Path) -> None:
+    """Write frames as MP4; imageio-ffmpeg must be installed, its errors are OSError and RuntimeError."""
     import imageio_ffmpeg
 
     height, width = frames[0].shape[:2]
     writer = imageio_ffmpeg.write_frames(
-        str(file), (width, height), fps=per_second, codec="libx264", quality=7, macro_block_size=2
+        str(file), (width, height), fps=1000 / _pause(len(frames)), codec="libx264", quality=7, macro_block_size=2
     )
     writer.send(None)
     for one in frames:

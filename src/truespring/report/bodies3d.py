@@ -52,9 +52,9 @@ def undeformed_picture(body: Undeformed) -> Picture:
     if len(facets):
         layers.append(solid(points, facets, _tinted(problem, facets, arrows), edges_of(facets), INK, 1.0))
     if springs is not None:
-        layers.append(_wires(points, facets, springs, 0.6))
+        layers.append(wires(points, facets, springs, 0.6))
     elif not len(facets):
-        layers.append(_wires(points, facets, mesh.edges, 0.6, INK))
+        layers.append(wires(points, facets, mesh.edges, 0.6, INK))
     tools = drawn_tools(problem, None)
     corners = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     taken = np.concatenate(
@@ -140,14 +140,14 @@ def over_layers(model: Solution, mine: Floats, reference: Solution | None, their
     facets = facets_of(model.problem.mesh)
     if reference is None or theirs is None:
         if not len(facets):
-            return (_wires(mine, facets, path_lines(model), 0.8),)
+            return (wires(mine, facets, path_lines(model), 0.8),)
         return (solid(mine, facets, one_color(facets, _BODY), path_lines(model), BLUE, 0.8),)
     others, lines = facets_of(reference.problem.mesh), path_lines(reference)
     if len(others):
         black = solid(theirs, others, one_color(others, _REFERENCE), lines, INK, 1.2)
     else:
-        black = _wires(theirs, others, lines, 1.3, INK)
-    return black, _wires(mine, facets, path_lines(model), 0.8)
+        black = wires(theirs, others, lines, 1.3, INK)
+    return black, wires(mine, facets, path_lines(model), 0.8)
 
 
 def distance_picture(result: Result, name: str, comparison: Comparison) -> Picture | None:
@@ -168,7 +168,7 @@ def distance_picture(result: Result, name: str, comparison: Comparison) -> Pictu
         return _dots_picture(result, name, comparison, pair) if result.in_detail else None
     colors = error_colors(pair.distance / (farthest or 1.0))[facets]
     surface = solid(pair.mine, facets, colors, edges_of(facets), INK, 0.35)
-    black = _wires(pair.theirs, facets, outline(pair.theirs, facets, silhouette=True), 1.1, INK)
+    black = wires(pair.theirs, facets, outline(pair.theirs, facets, silhouette=True), 1.1, INK)
     reference = display_name(result, name)
     bar = bar_of(farthest, pair.largest)
     title = f"{level_name(result, pair.level).capitalize()}: at most {bar.most} from {reference}"
@@ -193,7 +193,7 @@ def _dots_picture(result: Result, name: str, comparison: Comparison, pair: _Pair
             corners.append(points)
             layers.append(solid(points, facets, one_color(facets, _BODY), edges_of(facets), INK, 0.35))
     if not layers:
-        layers.append(_wires(pair.mine, facets_of(comparison.model.problem.mesh), path_lines(comparison.model), 0.6))
+        layers.append(wires(pair.mine, facets_of(comparison.model.problem.mesh), path_lines(comparison.model), 0.6))
     legend = (Entry("undeformed", FAINT, linestyle=_DASHES), Entry("probe", RED, "o", ""))
     picture = _pair_picture(result, name, comparison, pair, title, legend, tuple(layers), bar)
     ends = np.concatenate(corners)[:, :2]
@@ -264,7 +264,7 @@ def solid(points: Floats, facets: Ints, colors: Floats, lines: Ints, ink: str, w
     return Layer(points[facets], lit, points[lines[on]], owners, ink, _thin(width, int(on.sum())))
 
 
-def _wires(points: Floats, facets: Ints, lines: Ints, width: float, ink: str = BLUE) -> Layer:
+def wires(points: Floats, facets: Ints, lines: Ints, width: float, ink: str = BLUE) -> Layer:
     """Return lines on a surface, hidden behind nearer parts of it; of a body without a surface, all lines."""
     if not len(facets):
         return Layer(np.zeros((0, 3, 3)), None, points[lines], np.zeros((0, 2), int), ink, _thin(width, len(lines)))

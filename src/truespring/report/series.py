@@ -1,12 +1,16 @@
 """Deformed bodies as files: a VTU series for ParaView and an STL of the last state."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from numpy.typing import NDArray
 
-from truespring.arrays import Bools, in_space
+from truespring.arrays import Bools, Floats, Ints, in_space
 from truespring.comparison import Comparison
 from truespring.equilibrium import Solution, State
 from truespring.mesh import Mesh
@@ -15,6 +19,43 @@ from truespring.mesh.files.stl import stl_bytes
 from truespring.mesh.files.vtu_writing import write_vtu
 from truespring.potential import Visible
 from truespring.report.surfaces import facets_of
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """An undeformed body with the fields of one state, in SI units.
+
+    Attributes:
+        points: [m], shape (n_points, dim).
+        cells: blocks of a key of CELL_SHAPES and the points of its cells, shape (n_cells, k), as for `write_vtu`.
+        point_arrays: fields of the points by name: displacement [m] and reaction [N], shape (n_points, 3).
+        cell_arrays: fields of the cells of all blocks by name, see `Visible.cell_fields`.
+    """
+
+    points: Floats
+    cells: Sequence[tuple[str, Ints]]
+    point_arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    cell_arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def write(self, file: Path) -> None:
+        """Write it as VTU."""
+        write_vtu(file, self.points, self.cells, self.point_arrays, self.cell_arrays)
+
+
+def snapshot_of(path: Solution, state: State | None) -> Snapshot:
+    """Return the undeformed body with the fields of a state; the surface of a path without states for None."""
+    surface = path.surface or path.shell
+    if state is None and surface is not None:
+        return Snapshot(surface.points, [("triangle", surface.triangles)])
+    assert state is not None
+    mesh = path.problem.mesh
+    visible = path.potential if isinstance(path.potential, Visible) else None
+    return Snapshot(
+        mesh.nodes,
+        [*(visible.cells if visible else mesh.cells).items()],
+        {"displacement": in_space(state.displacement), "reaction": in_space(state.reaction)},
+        visible.cell_fields(state.all_positions) if visible else {},
+    )
 
 
 def write_series(path: Solution, folder: Path, name: str) -> None:
@@ -38,10 +79,7 @@ def write_series(path: Solution, folder: Path, name: str) -> None:
     forwards = all(one < other for one, other in pairwise(bodies))
     for number in range(len(bodies)):
         file = levels / f"{name}_{number:04d}.vtu"
-        if surface is not None:
-            write_vtu(file, surface.points, [("triangle", surface.triangles)])
-        else:
-            _write_state(path, path.states[number], file)
+        snapshot_of(path, None if surface is not None else path.states[number]).write(file)
         entries.append(
             f'<DataSet timestep="{times[number] if forwards else number!r}" file={quoteattr(f"{name}/{file.name}")}/>'
         )
@@ -53,19 +91,6 @@ def write_mesh(mesh: Mesh, file: Path, held: Bools | None = None) -> None:
     """Write the undeformed mesh as VTU [m], with a field `held` that is 1 in the directions that supports hold."""
     fields = {} if held is None else {"held": in_space(held.astype(float))}
     write_vtu(file, mesh.nodes, mesh.cells.items(), fields)
-
-
-def _write_state(path: Solution, state: State, file: Path) -> None:
-    """Write the undeformed body with the fields of a state as VTU."""
-    mesh = path.problem.mesh
-    visible = path.potential if isinstance(path.potential, Visible) else None
-    write_vtu(
-        file,
-        mesh.nodes,
-        (visible.cells if visible else mesh.cells).items(),
-        {"displacement": in_space(state.displacement), "reaction": in_space(state.reaction)},
-        visible.cell_fields(state.all_positions) if visible else {},
-    )
 
 
 def write_stl(path: Solution, file: Path) -> None:

@@ -5,9 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from truespring.comparison import TOLERANCE
-from truespring.errors import ProblemError
-from truespring.mesh import named_point, nearest_node
+from truespring.errors import MeshError, ProblemError
+from truespring.mesh import Mesh, named_point, nearest_node
 from truespring.models import Model, as_model, check_fibres
 from truespring.potential import Potential
 from truespring.problem import Problem
@@ -81,9 +83,6 @@ def case_of(
     for entry in entries.values():
         check_fibres(problem, entry)
     model = compared_model(entries)
-    if probe is not None and not isinstance(probe, int):
-        named = isinstance(probe, str)
-        probe = named_point(problem.mesh, probe) if named else nearest_node(problem.mesh, list(probe))
     return Case(
         title=title,
         problem=problem,
@@ -91,10 +90,21 @@ def case_of(
         entries=entries,
         model=model,
         references=tuple(name for name in entries if name != model),
-        probe=probe,
+        probe=None if probe is None else _node(problem.mesh, probe),
         tolerance=tolerance,
         refine=refine,
     )
+
+
+def _node(mesh: Mesh, probe: int | str | Sequence[float]) -> int:
+    """Return the number of the probe's node; raise MeshError if there is none."""
+    if isinstance(probe, str):
+        return named_point(mesh, probe)
+    if not isinstance(probe, int | np.integer):
+        return nearest_node(mesh, list(probe))
+    if not 0 <= probe < mesh.n_nodes:
+        raise MeshError(f"probe = {probe}: the mesh has {mesh.n_nodes} nodes, counted from 0")
+    return int(probe)
 
 
 def compared_model(models: Mapping[str, Model]) -> str:

@@ -38,9 +38,7 @@ def write_model(path: Solution, output: Output, name: str) -> None:
     write_stl(path, output.staging / f"deformed_{name}.stl")
 
 
-def write_rest(
-    result: Result, output: Output, command: str | None, report: bool = True, animate: bool = False
-) -> str:
+def write_rest(result: Result, output: Output, command: str | None, report: bool = True, animate: bool = False) -> str:
     """Write the files that cover all models and publish the output; return a note on an animation that is missing.
 
     Figures and report are written only with `report`, animation.gif and animation.mp4 only with `animate`. The report
@@ -53,17 +51,18 @@ def write_rest(
         write_reactions(result, folder / "reactions.csv")
     if result.problem.mesh.element != "line":
         write_mesh(result.problem.mesh, folder / "mesh.vtu", result.problem.loading.held)
-    if report:
-        from truespring.report.figures import save_figures
-        from truespring.report.page import write_page
-
-        save_figures(result, folder / "figures")
-        write_page([result], folder / "report.html", command)
     note = ""
     if animate:
         from truespring.report.animation import write_animation
 
         note = write_animation(result, folder)
+    if report:
+        from truespring.report.downloads import films_in
+        from truespring.report.figures import save_figures
+        from truespring.report.page import write_page
+
+        save_figures(result, folder / "figures")
+        write_page([result], folder / "report.html", command, [films_in(folder)])
     text = json.dumps(summary(result), indent=2, allow_nan=False)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     output.publish()
@@ -72,12 +71,14 @@ def write_rest(
 
 def write_overview(results: Sequence[Result], out: Path, animate: bool = False) -> None:
     """Write out/report.html over several studies that were written before; for one study, copy its report."""
+    from truespring.report.downloads import films_in
     from truespring.report.page import render_page
 
     if len(results) == 1:
         page = (out / results[0].stem / "report.html").read_bytes()
     else:
-        page = render_page(results, verify_command(results, out, animate)).encode()
+        films = [films_in(out / result.stem) for result in results]
+        page = render_page(results, verify_command(results, out, animate), films).encode()
     write_whole(out / "report.html", page)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from truespring.report.drawing import drawings
 from truespring.report.quantity import percent
-from truespring.report.shell import picture, render
+from truespring.report.shell import pictures, render
 from truespring.sweeping.figures import sweep_figures
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Seque
         n_failed=len(failed),
         sentences=[_sentence(reference, two, keys) for reference, two in extremes.items()],
         failed=[([_words(row[key]) for key in keys], row["reason"]) for row in failed[:_MOST_ROWS]],
-        pictures=[picture(drawing) for drawing in drawn.values()],
+        pictures=pictures(drawn, f"{file.stem}_sweep"),
         references=list(extremes),
         rows=[_shown(row, keys, list(extremes)) for row in rows[:_MOST_ROWS]],
     )

@@ -109,19 +109,16 @@ def contents(grid: Grid) -> Contents:
         node_numbers=np.arange(len(points)),
         points=points,
         cells=cells,
-        node_groups={
-            name: np.flatnonzero(values)
-            for name, values in _choices(point_arrays)
-            if values.min() == 0 and values.max() == 1
-        },
-        cell_groups=_cell_groups(cells, cell_arrays),
-        cell_vectors={
-            name: values.astype(np.float64)
-            for name, values in cell_arrays.items()
-            if values.dtype.kind in "fiu" and values.shape == (len(types), 3)
-        },
+        node_groups=point_groups(point_arrays),
+        cell_groups=cell_groups(cells, cell_arrays),
+        cell_vectors=vectors(cell_arrays, len(types)),
         notes=notes,
     )
+
+
+def kind_of(vtk_type: int) -> str:
+    """Return the kind of a cell of VTK's types, a key of CELL_KINDS."""
+    return _TYPES[vtk_type][0]
 
 
 def _blocks(types: Ints, sizes: Ints) -> list[Ints]:
@@ -155,12 +152,34 @@ def _choices(arrays: Arrays) -> list[tuple[str, NDArray[Any]]]:
     ]
 
 
-def _cell_groups(cells: Sequence[Cells], arrays: Arrays) -> dict[str, Ints]:
+def point_groups(arrays: Arrays) -> dict[str, Ints]:
+    """Return groups of points by the name of an array of 0 and 1."""
+    return {
+        name: np.flatnonzero(values)
+        for name, values in _choices(arrays)
+        if values.dtype.kind == "b" or (values.min() == 0 and values.max() == 1)
+    }
+
+
+def vectors(arrays: Arrays, n_cells: int) -> dict[str, Floats]:
+    """Return the arrays of three components of the cells, shape (n_cells, 3)."""
+    return {
+        name: values.astype(np.float64)
+        for name, values in arrays.items()
+        if values.dtype.kind in "fiu" and values.shape == (n_cells, 3)
+    }
+
+
+def cell_groups(cells: Sequence[Cells], arrays: Arrays) -> dict[str, Ints]:
+    """Return groups of cells: ARRAY of truth values, else ARRAY-VALUE, of the cells of the highest dimension."""
     dims = np.zeros(sum(len(block.numbers) for block in cells), dtype=np.int64)
     for block in cells:
         dims[block.numbers] = block.dim
     groups = {}
     for name, values in _choices(arrays):
+        if values.dtype.kind == "b":  # arrays of PyVista; no file has them
+            groups[name] = np.flatnonzero(values)
+            continue
         distinct = np.unique(values)
         for value in distinct if len(distinct) <= _MOST_VALUES else []:
             members = np.flatnonzero(values == value)

@@ -1,0 +1,55 @@
+"""Numbers and colours of axes: data stay in SI units, numbers are written in a unit that fits."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truespring.report.quantity import natural_scale
+from truespring.report.style import error_colors
+from truespring.showing.paints import Paint
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap, Normalize
+    from matplotlib.ticker import FuncFormatter
+
+
+def formatter(size: float) -> "FuncFormatter":
+    """Return a formatter of values in SI as numbers of a unit of a size."""
+    from matplotlib.ticker import FuncFormatter
+
+    def written(value: float, place: int | None = None) -> str:
+        return f"{value / size + 0.0:.6g}".replace("-", "\N{MINUS SIGN}")
+
+    return FuncFormatter(written)
+
+
+def colors_of(paint: Paint) -> "Colormap":
+    """Return the colours of a paint."""
+    import matplotlib
+    from matplotlib.colors import ListedColormap
+
+    if paint.colors == "distance":
+        return ListedColormap(error_colors(np.linspace(0, 1, 256)), name="distance")
+    return matplotlib.colormaps[{"diverging": "RdBu_r"}.get(paint.colors, paint.colors)]
+
+
+def range_of(paint: Paint) -> "Normalize":
+    """Return the range of the values: from zero, or the same to both sides of the middle."""
+    from matplotlib.colors import Normalize
+
+    known = paint.values[np.isfinite(paint.values)]
+    if paint.middle is None:
+        return Normalize(0.0, float(known.max(initial=0.0)) or 1.0)
+    far = float(np.abs(known - paint.middle).max(initial=0.0)) or 1.0
+    return Normalize(paint.middle - far, paint.middle + far)
+
+
+def add_bar(axes: "Axes", drawn: Any, paint: Paint) -> None:
+    """Add a colour bar with the name of the quantity and its unit."""
+    norm = range_of(paint)
+    scale = natural_scale(max(abs(float(norm.vmin or 0.0)), abs(float(norm.vmax or 0.0))), paint.unit)
+    label = paint.label if scale.unit == "-" else f"{paint.label} [{scale.unit}]"
+    figure: Any = axes.figure
+    bar = figure.colorbar(drawn, ax=axes, label=label, format=formatter(scale.size), shrink=0.9, pad=0.02)
+    bar.outline.set_linewidth(0.5)
