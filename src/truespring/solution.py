@@ -261,7 +261,8 @@ class Solution:
     def write(self, file: str | Path, level: int = -1) -> Path:
         """Write the solution to a file, in SI units; its suffix selects the format.
 
-        .pvd: all states, one .vtu each, for ParaView, as `truespring verify` writes them. .vtu: the state `level`.
+        .pvd: all states, one .vtu each, for ParaView, as `truespring verify` writes them. .vtkhdf: the same as one file
+        of HDF5, which has the undeformed body once (pip install 'truespring[vtkhdf]'). .vtu: the state `level`.
         .stl: the deformed body of the last state. .csv: the table of `table`, with units in the header line.
 
         Args:
