@@ -133,7 +133,7 @@ ALLOWED = {
         "study",
     },
     "sweeping": {"study", "report", "outputs"},
-    "showing": {"comparison", "mesh", "potential", "report", "solution", "units"},
+    "showing": {"comparison", "mesh", "models", "potential", "problem", "report", "solution", "units"},
     "study": {
         "outputs",
         "refining",

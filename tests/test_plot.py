@@ -11,7 +11,7 @@ from PIL import Image
 
 import truespring as ts
 from tests.test_solution_files import solved
-from truespring.errors import OutputError
+from truespring.errors import MeshError, OutputError
 
 matplotlib.use("agg")
 
@@ -214,3 +214,36 @@ def test_an_animation_has_a_frame_for_each_level(springs: ts.Solution, finite: t
     surface = ts.read_stl(springs.problem, springs.write(tmp_path / "springs.stl"))
     with pytest.raises(OutputError, match=r"needs two load levels or more, springs.stl has fewer"):
         surface.animate(tmp_path / "surface.gif")
+
+
+def test_a_mesh_shows_its_sides_and_groups(axes: Any) -> None:
+    ts.rectangle((0.04, 0.01), (8, 2)).plot(ax=axes)
+    assert words(axes) == ["27 nodes, 16 elements: quadrilateral", "left", "right", "bottom", "top"]
+    ends = np.array(artist(axes, "top").get_segments())
+    assert (ends[..., 1] == 0.01).all() and np.abs(np.diff(ends[..., 0])).sum() == pytest.approx(0.04)
+    other = ts.rectangle((0.04, 0.01), (8, 2)).plot(["right-middle"], ax=Figure().subplots())
+    assert np.asarray(artist(other, "right-middle").get_offsets()) == pytest.approx(np.array([[0.04, 0.005]]))
+    box = ts.box((0.02, 0.01, 0.01), (2, 1, 1))
+    halves = ts.Mesh(box.nodes, box.elements, "hexahedron", element_groups={"soft": np.array([1])})
+    image = artist(halves.plot(ax=Figure().subplots()), "image").get_array().astype(int)
+    tinted = (image[..., 3] > 250) & (image[..., 2] > image[..., 0] + 40)  # the blue of the first name
+    columns = np.flatnonzero(tinted.any(axis=0))
+    body = np.flatnonzero((image[..., 3] > 250).any(axis=0))
+    assert 0.3 < len(columns) / len(body) < 0.8 and columns.max() == pytest.approx(body.max(), abs=10)
+    with pytest.raises(MeshError, match=r"'lft' is no side or point of this body \(did you mean 'left'\?\)"):
+        box.plot(["lft"])
+    with pytest.raises(MeshError, match=r"names = 'left': a list of names is expected, such as \['left'\]"):
+        box.plot("left")
+
+
+@pytest.mark.parametrize("size", [(0.04, 0.01), (0.04, 0.01, 0.01)])
+def test_a_problem_shows_loads_and_springs(size: tuple[float, ...]) -> None:
+    problem = solved(size=size, model=ts.Springs("gaussian")).problem
+    load, blue = np.array([0xB8, 0x4A, 0x00]), np.array([0x00, 0x72, 0xB2])
+
+    def count(axes: Any, color: Any) -> int:
+        pixels = artist(axes, "image").get_array()[..., :3].astype(int)
+        return int((np.abs(pixels - color).max(axis=-1) < 24).sum())
+
+    plain, sprung = (problem.plot(model, ax=Figure().subplots()) for model in (None, ts.Springs("gaussian")))
+    assert count(plain, load) > 200 and count(plain, blue) == 0 and count(sprung, blue) > 200

@@ -1,7 +1,7 @@
 """The mesh: nodes, elements of one or several kinds, groups, and derived quantities."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -22,6 +22,7 @@ from truespring.mesh.rows import ascending, distinct_rows
 
 if TYPE_CHECKING:
     import pyvista
+    from matplotlib.axes import Axes
 
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
 # dimension: elements a thousand times longer than wide, as shapes allow, are well above.
@@ -153,6 +154,22 @@ class Mesh:
         from truespring.showing.grids import mesh_grid
 
         return mesh_grid(self)
+
+    def plot(self, names: Sequence[str] | None = None, ax: "Axes | None" = None) -> "Axes":
+        """Draw the mesh by matplotlib, with named parts in colours.
+
+        Data of the axes are in metres, numbers are written in a unit that fits. In space the body is an image.
+
+        Args:
+            names: groups, sides such as "left" or points such as "right-middle"; by default all groups (ten at most),
+                or the sides of a mesh without groups.
+            ax: axes to draw in; by default those of a new figure.
+
+        Returns the axes. Raises MeshError for a name that matches no node.
+        """
+        from truespring.showing.meshes import plot_mesh
+
+        return plot_mesh(self, names, ax)
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):

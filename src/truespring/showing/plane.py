@@ -4,12 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
 from truespring.mesh.facets import triangles_of
-from truespring.report.quantity import natural_scale
 from truespring.report.style import BLUE, FAINT, INK, MOTION
+from truespring.showing.frames import draw_dots, draw_lines, frame_plane, thinner
 from truespring.showing.paints import Paint
-from truespring.showing.scales import add_bar, colors_of, formatter, range_of
+from truespring.showing.scales import add_bar, colors_of, range_of
 from truespring.showing.scenes import Scene
 
 if TYPE_CHECKING:
@@ -18,8 +17,7 @@ if TYPE_CHECKING:
 #: Dashes of undeformed bodies, and width of lines [points].
 DASHES = (0, (3, 2))
 _MODEL, _REFERENCE, _RIM = 0.9, 1.4, 1.0
-# Lines beyond this number are drawn thinner; edges of elements over colours beyond it are left out.
-_MANY = 800
+# Most edges of elements that are drawn over colours.
 _MOST_EDGES = 4000
 
 
@@ -39,7 +37,7 @@ def draw_plane(axes: "Axes", scene: Scene) -> None:
             draw_dots(axes, scene.mine.points, 3, "solution", color=BLUE)
     for tool in scene.tools:
         draw_lines(axes, tool.points, tool.lines, MOTION, 1.2, 5, "tool")
-    _frame(axes, scene)
+    frame_plane(axes, *scene.box)
 
 
 def draw_rest(axes: "Axes", scene: Scene) -> None:
@@ -51,23 +49,6 @@ def draw_rest(axes: "Axes", scene: Scene) -> None:
         draw_lines(axes, rest.points, rest.outline, FAINT, _RIM, 1, "undeformed", linestyle=DASHES)
 
 
-def draw_lines(
-    axes: "Axes", points: Floats, pairs: Ints, color: str, width: float, zorder: float, name: str, **more: Any
-) -> None:
-    """Draw lines between points, of a width [points], thinner the more there are; `name` is their gid."""
-    from matplotlib.collections import LineCollection
-
-    width *= min(1.0, max(0.3, (_MANY / max(len(pairs), 1)) ** 0.5))
-    ends = list(points[pairs][..., :2])
-    axes.add_collection(LineCollection(ends, colors=color, linewidths=width, zorder=zorder, gid=name, **more))
-
-
-def draw_dots(axes: "Axes", points: Floats, zorder: float, name: str, **style: Any) -> Any:
-    """Draw points as dots with a rim."""
-    rim: dict[str, Any] = {"linewidths": 0.4, "edgecolors": "#00000088"}
-    return axes.scatter(points[:, 0], points[:, 1], s=16, zorder=zorder, gid=name, **rim, **style)
-
-
 def draw_colored_lines(axes: "Axes", scene: Scene, paint: Paint) -> Any:
     """Draw springs, or the lines of a network, in colours of their values or of the means of their ends."""
     from matplotlib.collections import LineCollection
@@ -76,13 +57,12 @@ def draw_colored_lines(axes: "Axes", scene: Scene, paint: Paint) -> Any:
     values = paint.values if paint.on == "lines" else paint.values[pairs].mean(axis=1)
     points = scene.mine.points[pairs]
     order = np.argsort(points[..., 2].mean(axis=1)) if points.shape[2] > 2 else np.arange(len(pairs))
-    width = 1.4 * min(1.0, max(0.4, (_MANY / max(len(pairs), 1)) ** 0.5))
     drawn = LineCollection(
         list(points[order][..., :2]),
         array=values[order],
         cmap=colors_of(paint),
         norm=range_of(paint),
-        linewidths=width,
+        linewidths=1.4 * thinner(len(pairs)),
         zorder=3,
         gid="colors",
     )
@@ -111,16 +91,3 @@ def _draw_colors(axes: "Axes", scene: Scene, paint: Paint) -> Any:
     edges = mesh.edges if len(mesh.edges) <= _MOST_EDGES else mesh.boundary
     draw_lines(axes, points, edges, "#00000055", 0.5, 3, "elements")
     return drawn
-
-
-def _frame(axes: "Axes", scene: Scene) -> None:
-    """Set equal scales, limits and labels with a unit that fits; data stay in metres."""
-    low, high = scene.box
-    scale = natural_scale(float(np.abs([low, high]).max()), "m")
-    axes.set_aspect("equal")
-    axes.set_xlim(float(low[0]), float(high[0]))
-    axes.set_ylim(float(low[1]), float(high[1]))
-    for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
-        axis.set_major_formatter(formatter(scale.size))
-        axis.set_label_text(f"{name} [{scale.unit}]")
-    axes.spines[["top", "right"]].set_visible(False)

@@ -1,6 +1,6 @@
 """Pictures of solutions in axes of matplotlib."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from truespring.report.quantity import times
 from truespring.report.result import Result
 from truespring.report.style import BLUE, FAINT, INK, MOTION
 from truespring.report.touching import drawn_tools, entries
+from truespring.showing.frames import Entry, draw_legend, new_axes
 from truespring.showing.levels import numbered
 from truespring.showing.paints import paint_of
 from truespring.showing.pairs import result_of, states_of_both
@@ -23,10 +24,6 @@ from truespring.solution import Solution, State
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Width of a figure, least and largest height [inch]: as wide as the text of a notebook.
-_WIDTH, _LEAST, _MOST = 6.4, 2.2, 5.6
-# Room above and below the body, beside it, and for a colour bar; least height with the label of a bar [inch].
-_HEAD, _SIDE, _BAR, _LEAST_BAR = 1.1, 0.7, 0.9, 3.0
 # Characters of a line of the title.
 _LINE = 64
 
@@ -53,14 +50,14 @@ def plot_solution(
         paint=None if color is None else paint_of(color, solution, state, over),
         tools=drawn_tools(solution.problem, state.level or 0.0),
     )
-    names = [] if color else [(solution.label, BLUE, "-")]
-    names += [] if over is None else [(f"outline of {over.label}" if color else over.label, INK, "-")]
-    names += [("undeformed", FAINT, "--")]
-    names += [(entry.text, MOTION, "-") for entry in entries(solution.problem)]
+    names = [] if color else [Entry(solution.label, BLUE)]
+    names += [] if over is None else [Entry(f"outline of {over.label}" if color else over.label, INK)]
+    names += [Entry("undeformed", FAINT, "--")]
+    names += [Entry(entry.text, MOTION) for entry in entries(solution.problem)]
     head = [solution.label] if color else []
     head += [_level_words(result, state)]
     head += [f"displacements {times(factor)}"] if factor != 1 else []
-    return draw(scene, _wrapped(head), names, axes)
+    return _draw(scene, _wrapped(head), names, axes)
 
 
 def _plot_surface(solution: Solution, over: Solution | None, color: str | None, axes: "Axes | None") -> "Axes":
@@ -70,7 +67,7 @@ def _plot_surface(solution: Solution, over: Solution | None, color: str | None, 
             f"{solution.label} is a surface without displacements: draw it alone, or as the reference: plot(over=...)"
         )
     scene = Scene(mesh=solution.problem.mesh, rest=None, mine=shape_of(solution, None, 1.0))
-    return draw(scene, solution.label, [(solution.label, BLUE, "-")], axes)
+    return _draw(scene, solution.label, [Entry(solution.label, BLUE)], axes)
 
 
 def _factor(result: Result, over: Solution | None, magnify: float | None) -> float:
@@ -107,48 +104,8 @@ def _wrapped(words: list[str]) -> str:
     return "\n".join(lines)
 
 
-def draw(scene: Scene, title: str, names: list[tuple[str, str, str]], axes: "Axes | None") -> "Axes":
-    """Draw a scene into axes, those of a new figure for None, with a title and names of lines in a legend.
-
-    `names` are text, colour and line style.
-    """
-    axes = _new_axes(scene) if axes is None else axes
+def _draw(scene: Scene, title: str, names: list[Entry], axes: "Axes | None") -> "Axes":
+    axes = new_axes(*scene.box, has_bar=scene.paint is not None) if axes is None else axes
     (draw_plane if scene.is_plane else draw_space)(axes, scene)
-    _legend(axes, title, names)
+    draw_legend(axes, title, names)
     return axes
-
-
-def _new_axes(scene: Scene) -> "Axes":
-    """Return the axes of a new figure of pyplot, which notebooks show and `pyplot.show` opens."""
-    from matplotlib import pyplot
-
-    _, axes = pyplot.subplots(figsize=figure_size(scene), layout="constrained")
-    return axes
-
-
-def figure_size(scene: Scene) -> tuple[float, float]:
-    """Return width and height of a figure [inch]."""
-    low, high = scene.box
-    wide, tall = high - low
-    room = _WIDTH - _SIDE - _BAR * (scene.paint is not None)
-    least = _LEAST if scene.paint is None else _LEAST_BAR
-    return _WIDTH, float(np.clip(room * tall / wide + _HEAD, least, _MOST))
-
-
-def _legend(axes: "Axes", title: str, names: list[tuple[str, str, str]]) -> None:
-    """Write title and names above the axes."""
-    from matplotlib.lines import Line2D
-
-    legend: Any = axes.legend(
-        handles=[Line2D([], [], color=color, ls=style, label=label) for label, color, style in names],
-        title=title,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=2 if sum(len(label) for label, _, _ in names) > 60 else len(names),
-        frameon=False,
-        fontsize="small",
-        alignment="left",
-        borderpad=0.1,
-        borderaxespad=0.3,
-    )
-    legend.set_title(title, prop={"weight": "bold", "size": "medium"})
