@@ -69,6 +69,16 @@ class Problem:
 
     Raises ProblemError or MeshError if the parts do not fit together, if there is no load, or if the body or a
     disconnected part of it can move as a rigid body.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.16, 0.04), (16, 4)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.0, -0.043))],
+        ... )
     """
 
     mesh: Mesh
@@ -145,6 +155,9 @@ class Problem:
             ax: axes of matplotlib to draw in; by default those of a new figure.
 
         Returns the axes. Raises ModelError if the model does not fit the problem.
+
+        Example:
+            >>> axes = problem.plot(ts.Springs("gaussian"))
         """
         from truespring.showing.problems import plot_problem
 

@@ -112,6 +112,33 @@ def draw_lines(
     axes.add_collection(LineCollection(ends, colors=color, linewidths=width, zorder=zorder, gid=name, **more))
 
 
+def draw_dashes(axes: "Axes", points: Floats, pairs: Ints, color: str, width: float, zorder: float, name: str) -> None:
+    """Draw lines between points as dashed curves through several of them, as dashes restart in each curve."""
+    from matplotlib.collections import LineCollection
+
+    curves = [points[nodes][:, :2] for nodes in curves_of(pairs)]
+    style: Any = {"linestyle": (0, (3, 2)), "zorder": zorder, "gid": name}
+    axes.add_collection(LineCollection(curves, colors=color, linewidths=width, **style))
+
+
+def curves_of(pairs: Ints) -> list[list[int]]:
+    """Return curves through the ends of lines, shape (n, 2): each line is in one curve, once."""
+    beside: dict[int, list[int]] = {}
+    for one, other in pairs.tolist():
+        beside.setdefault(one, []).append(other)
+        beside.setdefault(other, []).append(one)
+    curves = []
+    for start in sorted(beside, key=lambda node: len(beside[node]) == 2):  # closed curves last
+        while beside[start]:
+            curve = [start]
+            while beside[curve[-1]] and (len(curve) == 1 or len(beside[curve[-1]]) == 1):
+                following = beside[curve[-1]].pop()
+                beside[following].remove(curve[-1])
+                curve.append(following)
+            curves.append(curve)
+    return curves
+
+
 def thinner(n_lines: int) -> float:
     """Return the factor of the width of many lines."""
     return float(np.clip((_MANY / max(n_lines, 1)) ** 0.5, 0.3, 1.0))

@@ -37,6 +37,10 @@ def plot_solution(
     axes: "Axes | None",
 ) -> "Axes":
     """Draw a state of a solution into axes, see `Solution.plot`."""
+    if hasattr(axes, "get_zlim"):
+        raise OutputError(
+            "ax has three axes: bodies in space are drawn as an image in plane ones: leave projection out"
+        )
     if not solution.states:
         return _plot_surface(solution, over, color, axes)
     state = numbered(states_of_both(solution, over), level, solution)
