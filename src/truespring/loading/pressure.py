@@ -64,7 +64,7 @@ class Pressure(FollowingLoad):
         return replace(self, pressure=factor * self.pressure)
 
     def mark(self, body: Body, held: Bools) -> Mark:
-        """Return the facets, and an arrow along the total force on the undeformed body, or on one node if it is zero."""
+        """Return the facets, and an arrow along the total force on the body at rest, or on one node if it is zero."""
         force = -self.following(body, held).gradient(body.nodes)
         nodes = loaded(body.mesh, self.on)
         total = force.sum(axis=0)
