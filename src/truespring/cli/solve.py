@@ -79,7 +79,7 @@ def _output(study: "Study", out: Path) -> "Iterator[tuple[Output, Known]]":
 
     def known(name: str, path: "Solution") -> None:
         with writing(out):
-            write_model(path, opened, name)
+            write_model(path, opened, name, study.form)
 
     with opened:
         yield opened, known

@@ -13,6 +13,7 @@ from truespring.material import SECTIONS, Section
 from truespring.mesh import Mesh
 from truespring.models import Model, SpringNetwork, check_fibres
 from truespring.problem import Problem
+from truespring.report.series import Form
 from truespring.solvers import Solver
 from truespring.study.changes import changed
 from truespring.study.faults import fault_lines
@@ -37,6 +38,7 @@ class Study:
         probe: number of the probe's node; None for the node that moves most.
         tolerance: largest error, rms or of force, at which two results agree.
         refine: whether each reference is also solved on a finer mesh to estimate its discretisation error.
+        form: form of the files of the levels.
     """
 
     title: str
@@ -51,6 +53,7 @@ class Study:
     probe: int | None
     tolerance: float
     refine: bool = True
+    form: Form = "vtu"
 
     @property
     def file(self) -> Path:
@@ -160,6 +163,7 @@ def _build(text: StudyText, keys: StudyKeys, halvings: int, balanced: bool) -> S
         probe=keys.compare.node(places, problem.mesh),
         tolerance=keys.compare.tolerance,
         refine=keys.compare.refine,
+        form=keys.output.build(places),
     )
 
 

@@ -75,6 +75,7 @@ def run(
         else {},
         standings=standings(study, paths, names, timeout) if refining else {},
         splits=motion_errors(study, model, probe, timeout) if comparing and refining else None,
+        form=study.form,
     )
 
 
