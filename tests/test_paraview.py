@@ -53,7 +53,7 @@ def test_the_script_warps_every_series_by_its_displacement(
 @pytest.mark.parametrize("form", ["vtu", "vtkhdf"])
 def test_a_study_writes_its_levels_in_a_form(form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     changes = {"output.form": form, "solver.load_steps": 1, "solver.tolerance": 1e-6, "mesh.elements": [8, 2]}
-    study = read_study(EXAMPLES / "bending.toml", changes=changes)
+    study = read_study(EXAMPLES / "bending.toml", **changes)
     result = run(study, refining=False)
     write(result, tmp_path, report=False)
     folder = tmp_path / "bending"
@@ -76,9 +76,9 @@ def _constant(one: ast.Assign) -> bool:
 def test_a_form_without_its_library_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(StudyError, match=r"output.*\"vtkhdf\" needs h5py: pip install 'truespring\[vtkhdf\]'"):
-        read_study(EXAMPLES / "bending.toml", changes={"output.form": "vtkhdf"})
+        read_study(EXAMPLES / "bending.toml", **{"output.form": "vtkhdf"})
     with pytest.raises(StudyError, match=r"(?s)form.*vtk.*vtu"):
-        read_study(EXAMPLES / "bending.toml", changes={"output.form": "vtk"})
+        read_study(EXAMPLES / "bending.toml", **{"output.form": "vtk"})
 
 
 @pytest.mark.verification
