@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
 # Resolution of pictures [pixels/inch], the number of their colours, and their largest width [CSS px].
-_DPI, _COLORS, _WIDTH = 120, 96, 620
+_DPI, _COLORS, _WIDTH = 110, 96, 480
 # Number of rows of a table beyond which the rest is left out.
 _MOST_ROWS = 24
 
