@@ -32,6 +32,8 @@ from truespring.report.result import Result
 from truespring.report.sheet import Area, Sheet
 from truespring.report.style import figure_style
 from truespring.report.summary import summary
+from truespring.report.support_curves import support_figures
+from truespring.report.symbols import find_arrows
 from truespring.report.undeformed import undeformed_of
 from truespring.report.verdict import (
     carrying_sentence,
@@ -278,7 +280,7 @@ def test_a_body_that_pushes_does_not_look_like_one_that_pulls(way: int, page_of:
     direction = "x" if way > 0 else "−x"
     parts = ("force", f"along {direction}:", f"linear FEM {size},", f"a spring let go −{size} (200 %")
     assert in_order(force_sentence(found) or "", *parts)
-    data = json.loads(page_of(found).scripts[0])
+    data = page_of(found).data
     assert data["motion"] and [one["force"][-1] for one in data["paths"]] == [size, f"−{size}"]
 
 
@@ -565,7 +567,7 @@ def test_magnified_pictures_say_so_and_show_it(page_of: Callable[[Result], "Page
     page = page_of(found)
     assert "displacements × 50" in page.said
     assert page.tags.count("canvas") == 1
-    data = json.loads(page.scripts[0])
+    data = page.data
     assert data["box"][1] == pytest.approx(20 + 50 * 0.1)
     plain = result(moved_by(problem, 4e-3, kind="springs", label="springs"), {"linear": moved_by(problem, 1e-4)})
     texts = words(draw_figures(plain)[over_name(plain, "linear")])
@@ -585,7 +587,7 @@ def test_a_surface_is_magnified_only_where_its_displacement_is_known(page_of: Ca
         figure = draw_figures(found)[over_name(found, "ansys")]
         (dot,) = called(figure, "probe")
         assert np.ravel(dot.get_data()) == pytest.approx([80, factor * 0.08])
-        data = json.loads(page_of(found).scripts[0])
+        data = page_of(found).data
         assert (data["magnified"] == "") == (factor == 1)
         assert (data["paths"][1]["surface"] is None) == (factor > 1)
 
@@ -607,7 +609,7 @@ def test_the_picture_follows_the_body_and_the_model_not_a_reference_that_goes_fa
         (drawn,) = called(figure, "reference")
         assert drawn.get_clip_path() is not None or drawn.get_clip_box() is not None
     assert heights["near"] > 120 and 60 < heights["far"] < 80  # mm
-    data = json.loads(page_of(found).scripts[0])
+    data = page_of(found).data
     assert data["box"] == pytest.approx([80, 120])
     assert [one["beyond"] for one in data["paths"]] == [False, False, True]
     steps = np.frombuffer(base64.b64decode(data["paths"][2]["positions"][-1]), dtype="<f4").reshape(-1, 2)
@@ -702,6 +704,11 @@ class Page(HTMLParser):
         self._in_tag = False
         self.feed(text)
 
+    @property
+    def data(self) -> Any:
+        """The data of the first interactive view."""
+        return json.loads(next(script for script in self.scripts if script.startswith("{")))
+
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         values = {name: value or "" for name, value in attrs}
         self.tags.append(tag)
@@ -725,7 +732,9 @@ def test_page_loads_nothing_and_escapes_what_it_was_given(solved: Result, tmp_pa
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     page = Page(text)
     assert len(page.loaded) == 2 * 6 and all(address.startswith("data:image/") for address in page.loaded)
-    assert page.links and all(link.removeprefix("#") in page.ids for link in page.links)
+    own = [link for link in page.links if link.startswith("#")]
+    assert own and all(link.removeprefix("#") in page.ids for link in own)
+    assert all(link.startswith("data:text/csv;base64,") for link in set(page.links) - set(own))
     assert page.policy.startswith("default-src 'none';")
     assert not {"link", "iframe", "object", "embed", "base"} & set(page.tags)
     assert "url(" not in "".join(page.said) and "@import" not in text
@@ -815,7 +824,7 @@ def test_a_model_that_failed_shows_its_advice(solved: Result) -> None:
 
 def test_the_viewer_holds_the_positions_of_every_level(solved: Result) -> None:
     page = Page(render_page([solved], ""))
-    data = json.loads(page.scripts[0])
+    data = page.data
     assert [one["name"] for one in data["paths"]] == ["springs", "linear", "a/b"]
     assert data["paths"][0]["levels"] == solved.paths["springs"].load_factors.tolist()
     clouds = [solved.problem.mesh.nodes, *(state.positions for one in solved.paths.values() for state in one.states)]
@@ -868,6 +877,57 @@ def test_reactions_of_moved_supports_are_written_and_drawn(tmp_path: FilePath) -
         if row["model"] == "a":  # linear elements balance on the body at rest
             assert float(row["mz"]) + own == pytest.approx(-others, rel=1e-6)
     assert "reactions" in draw_figures(told)
+
+
+@pytest.mark.parametrize("pressure", [300.0, -100.0])
+def test_pressure_has_arrows_along_its_side(pressure: float) -> None:
+    problem = replace(stretched(), loads=(ts.Pressure("top", pressure),))
+    arrows = find_arrows(problem, 0.08)
+    tails, tips = (np.array(ends) for ends in zip(*(arrow.ends for arrow in arrows), strict=True))
+    assert tips - tails == pytest.approx(np.tile([0.0, -0.08 * 0.08 * np.sign(pressure)], (4, 1)))
+    at_side = tips if pressure > 0 else tails
+    assert at_side == pytest.approx(np.column_stack([0.01 + 0.02 * np.arange(4), np.full(4, 0.02)]))
+    assert [arrow.text for arrow in arrows] == ["", "", "", f"p = {pressure:g} Pa".replace("-", "\N{MINUS SIGN}")]
+
+
+def test_pressure_in_space_has_arrows_where_its_side_is_seen() -> None:
+    block = ts.Problem(
+        ts.box((0.04, 0.04, 0.04), (2, 2, 2)),
+        ts.Material(1e4, 0.3),
+        None,
+        [ts.Fixed("left")],
+        [ts.Pressure("top", 1.0)],
+    )
+    towards = np.array([0.55, 0.5, 1.0])
+
+    def arrows(side: str) -> int:
+        return len(find_arrows(replace(block, loads=(ts.Pressure(side, 1.0),)), 0.04, lambda at: at[:, :2], towards))
+
+    assert (arrows("top"), arrows("right"), arrows("bottom")) == (4, 4, 1)
+
+
+def test_every_moved_support_has_curves_of_its_force_and_torque() -> None:
+    """A block twisted at one end and pressed at the other: the curves end at the resultants of reactions."""
+    problem = ts.Problem(
+        ts.rectangle((0.16, 0.04), (8, 2)),
+        ts.Material(1e4, 0.3),
+        ts.PlaneStress(0.01),
+        [ts.Fixed("left", displacement=(0.004, 0.0)), ts.Fixed("right", rotation=0.2)],
+        [],
+    )
+    path = ts.solve(problem, ts.Springs("isotropic"), ts.Newton(load_steps=2))
+    figures = dict(support_figures(result(path, {})))
+    titles = [sheet.title for sheet in figures.values()]
+    assert list(figures)[:2] == ["reactions", "reactions_2"]
+    assert {"Torque of support 2, right", "Force of support 1, left"} <= set(titles)
+    right, state = problem.held[1].nodes, path.states[-1]
+    arms = state.positions[right] - state.positions[right].mean(axis=0)
+    torque = (arms[:, 0] * state.reaction[right, 1] - arms[:, 1] * state.reaction[right, 0]).sum()
+    sheet = next(sheet for sheet in figures.values() if sheet.title == "Torque of support 2, right")
+    line = next(one for one in sheet.artists if isinstance(one, Line2D) and len(one.get_xdata()) == 3)
+    assert "torque of the support [mN m]" in words(sheet)
+    assert line.get_xdata()[-1] == pytest.approx(1e3 * torque)
+    assert line.get_ydata() == pytest.approx(np.degrees([0.0, 0.1, 0.2]))
 
 
 def test_loads_without_a_total_are_drawn_by_their_factor() -> None:

@@ -2,7 +2,6 @@
 
 import base64
 import importlib.util
-import json
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -470,6 +469,7 @@ def test_every_model_of_springs_is_drawn_by_its_springs(model: ts.Springs) -> No
 
 def test_nodes_inside_that_nothing_is_drawn_at_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("truespring.report.scene._MOST_SPRINGS", 100)
+    monkeypatch.setattr("truespring.report.scene._MOST_SOLID", 100)
     problem = body(elements=(6, 3, 3))
     found = result(problem)
     data = viewer(found, 400_000)
@@ -516,12 +516,12 @@ def test_the_bundle_is_part_of_pages_with_a_body_in_3d_alone(page_of: Callable[.
     )
     only = ts.solve(plane, ts.Fem("linear"), ts.Newton(load_steps=2))
     flat = Result("Flat", FilePath("flat.toml"), plane, {"linear": only}, 1, "linear", {}, 0.05, "")
-    assert len(scripts(page_of(flat))) == 2  # the data, and what draws them
+    assert len(scripts(page_of(flat))) == 4  # the two of every page, the data, and what draws them
     both = scripts(page_of(result(body()), flat))
-    assert [script == bundle().strip() for script in both] == [False, False, True, False]
+    assert [script == bundle().strip() for script in both] == [False, False, False, False, True, False]
     still = result(body(), references={})
     still = replace(still, paths={"springs": path(body(), 1.0, levels=(0.0,), kind="springs", label="springs")})
-    assert len(scripts(page_of(still))) == 1  # nothing turns
+    assert len(scripts(page_of(still))) == 3  # nothing turns
 
 
 def test_a_page_in_3d_loads_nothing(page_of: Callable[..., Page]) -> None:
@@ -533,7 +533,7 @@ def test_a_page_in_3d_loads_nothing(page_of: Callable[..., Page]) -> None:
     assert addresses <= {"http://www.w3.org/1999/xhtml"}  # a name, which is not fetched
     for word in ("fetch(", "XMLHttpRequest", "WebSocket", "importScripts", "import(", "eval("):
         assert word not in bundle().replace(".import(", "")
-    data = json.loads(page.scripts[0])
+    data = page.data
     assert len(data["box"]) == 3 and "canvas" in page.tags
 
 
@@ -562,7 +562,7 @@ def test_the_page_speaks_of_a_body_in_3d(page_of: Callable[..., Page]) -> None:
     assert in_order(words, "mesh: 2 nodes that no element uses were left out")
     assert "note: mesh: 2 nodes that no element uses were left out" in list(result_tables(found))
     assert words.count("Drawn by hand.") == 1
-    assert "coloured by its distance" in words and "colour by distance" in words and "WebGL" in words
+    assert "coloured by its distance" in words and "distance from the reference" in words and "WebGL" in words
 
 
 def test_a_push_along_z_is_told_as_such(page_of: Callable[..., Page], by_matplotlib: None) -> None:
@@ -578,7 +578,7 @@ def test_a_body_too_large_for_a_page_says_where_its_levels_are(
 ) -> None:
     monkeypatch.setattr("truespring.report.page._BUDGET", 100)
     page = page_of(result(body()))
-    assert in_order(told(page), "too large", ".pvd", "ParaView") and len(scripts(page)) == 1
+    assert in_order(told(page), "too large", ".pvd", "ParaView") and len(scripts(page)) == 3
 
 
 # --- files ----------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """report.html: one self-contained file with the results of one or several studies."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from truespring.models import Moduli
 from truespring.potential import Noted
 from truespring.problem import Problem
 from truespring.report.axis import Axis, axis_of
+from truespring.report.downloads import Films, downloads, moving_picture
 from truespring.report.facts import facts, in_short
 from truespring.report.figures import distance_name, energies_name, film_name, over_name, render_figures
 from truespring.report.parts import part_rows
@@ -42,14 +43,24 @@ from truespring.report.viewer import viewer
 _BUDGET = 400_000
 
 
-def write_page(results: Sequence[Result], file: Path, command: str | None) -> None:
-    """Write one page on `results`; `command` is the command line that repeats the run."""
-    file.write_text(render_page(results, command), encoding="utf-8")
+def write_page(results: Sequence[Result], file: Path, command: str | None, films: Sequence[Films] = ()) -> None:
+    """Write one page on `results`; see `render_page`."""
+    file.write_text(render_page(results, command, films), encoding="utf-8")
 
 
-def render_page(results: Sequence[Result], command: str | None) -> str:
-    """Return the page as HTML."""
-    studies = [_study(result, place, _BUDGET // len(results)) for place, result in enumerate(results, 1)]
+def render_page(results: Sequence[Result], command: str | None, films: Sequence[Films] = ()) -> str:
+    """Return the page as HTML.
+
+    Args:
+        results: of one or several studies.
+        command: the command line that repeats the run.
+        films: the animation of each study; empty without animations.
+    """
+    budget, level = _BUDGET // len(results), "h3" if len(results) > 1 else "h2"
+    studies = [
+        {**_study(result, place, budget), "level": level, **_taken(result, shown)}
+        for place, (result, shown) in enumerate(zip(results, films or [{}] * len(results), strict=True), 1)
+    ]
     what, several = ("comparison", "comparisons") if results[0].in_detail else ("study", "studies")
     has_3d_view = any(study["viewer"] and study["in_space"] for study in studies)
     scene = ("report/scene.min.js",) if has_3d_view else ()
@@ -59,19 +70,21 @@ def render_page(results: Sequence[Result], command: str | None) -> str:
         (*scene, "report/viewer.js"),
         title=results[0].title if len(results) == 1 else f"{len(results)} {several}",
         what=what,
+        several=several,
         studies=studies,
     )
 
 
 def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
     drawings = render_figures(result)
-    pictures = {name: picture(drawing) for name, drawing in drawings.items()}
+    pictures = {name: picture(drawing, f"{result.stem}_{name}") for name, drawing in drawings.items()}
     nearest = result.closest if len(result.comparisons) == 1 else nearest_reference(result)
     in_space = result.problem.mesh.dim == 3
     moving = viewer(result, budget)
     return {
         "id": f"study-{place}",
         "title": result.title,
+        "stem": result.stem,
         "verdict": verdict_sentences(result),
         "more": [text for sentence in _SENTENCES if (text := sentence(result))],
         "converged": result.converged,
@@ -89,15 +102,16 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "note": result.note,
         "file": str(result.file),
         "pictures": pictures,
-        "over": [
-            pictures[drawn]
-            for name in result.comparisons
-            for drawn in (over_name(result, name), distance_name(result, name))
-            if drawn in pictures
-        ],
+        "over": [pictures[drawn] for name in result.comparisons for drawn in _over(result, name, pictures)],
         "films": [pictures[drawn] for drawn in _films(result) if drawn in pictures],
         "parts": part_rows(result),
-        "histories": ["curves", "reactions", "tools", *map(energies_name, result.paths), "error"],
+        "histories": [
+            "curves",
+            *(name for name in pictures if name.startswith("reactions")),
+            "tools",
+            *map(energies_name, result.paths),
+            "error",
+        ],
         "viewer": moving,
         "model": result.model,
         "axis": axis_of(result),
@@ -113,6 +127,21 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "moduli_note": _section_note(result.problem),
         "source": result.source,
     }
+
+
+def _taken(result: Result, films: Films) -> dict[str, Any]:
+    return {"downloads": downloads(result, films), "moving_picture": moving_picture(result, films)}
+
+
+def _over(result: Result, name: str, pictures: Mapping[str, Any]) -> list[str]:
+    """Return the name of the picture of the model over a reference; the one coloured by distance if there is one."""
+    both = (distance_name(result, name), over_name(result, name))
+    return [drawn for drawn in both if drawn in pictures][:1]
+
+
+def _reactions(pictures: Mapping[str, Any]) -> list[str]:
+    """Return the names of the curves of moved supports."""
+    return [name for name in pictures if name.startswith("reactions")]
 
 
 def _films(result: Result) -> Iterator[str]:

@@ -39,7 +39,9 @@ def _groups(validity: Maps, drawings: Mapping[str, Drawing]) -> Iterator[dict[st
     for name in dict.fromkeys(one.rule.name if by_rule else one.load.name for one in validity.maps):
         maps = [one for one in validity.maps if (one.rule.name if by_rule else one.load.name) == name]
         begins = f"validity_{name.replace('+', '_')}"
-        kept = [drawn for stem, drawn in drawings.items() if stem == begins or stem.startswith(f"{begins}_")]
+        kept = [
+            picture(drawn, stem) for stem, drawn in drawings.items() if stem == begins or stem.startswith(f"{begins}_")
+        ]
         yield {
             "title": maps[0].rule.words[0].upper() + maps[0].rule.words[1:] if by_rule else maps[0].load.did,
             "how": "" if by_rule else maps[0].load.how,
@@ -49,7 +51,7 @@ def _groups(validity: Maps, drawings: Mapping[str, Drawing]) -> Iterator[dict[st
                 for one in maps
                 if one.rule.same
             ],
-            "pictures": [picture(drawn) for drawn in kept],
+            "pictures": kept,
         }
 
 
