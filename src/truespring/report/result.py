@@ -92,6 +92,12 @@ class Result:
     def __repr__(self) -> str:
         return f"Result({self.stem}, {list(self.paths.values())})"
 
+    def _repr_html_(self) -> str:
+        """Return the result as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
+
     @property
     def stem(self) -> str:
         """Name of the study file without suffix, and of its output folder."""
