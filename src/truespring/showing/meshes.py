@@ -55,7 +55,7 @@ def plot_mesh(mesh: Mesh, names: Sequence[str] | None, axes: "Axes | None") -> "
     low, high = low - margin, high + margin
     axes = new_axes(low, high) if axes is None else axes
     (_draw_plane if mesh.dim == 2 else _draw_space)(axes, mesh, points, marked, low, high)
-    title = f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.kinds}"
+    title = [f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.kinds}"]
     draw_legend(axes, title, [Entry(one.name, one.color, "-", 3.0) for one in marked])
     return axes
 
