@@ -12,6 +12,7 @@ from truespring.calibration import Curve, LoadCase, Objective, identifiability, 
 from truespring.calibration.fitted import CaseResult
 from truespring.calibration.full_field import equations, fit_full_field
 from truespring.calibration.objective import relative_errors
+from truespring.calibration.shapes import shape_figure
 from truespring.errors import ModelError, ProblemError, ReferenceFileError
 from truespring.problem import Problem
 from truespring.reference import Level, Placing, Record, placed
@@ -543,6 +544,18 @@ def test_what_does_not_fit_is_refused() -> None:
         apart = case_of(other, ts.Springs("isotropic"), 1, "other")
         with pytest.raises(ProblemError, match=f"other: its {what} "):
             ts.calibrate(case, ts.Springs("lloyd"), held_out=apart)
+
+
+def test_a_shape_has_the_body_before_after_and_the_reference() -> None:
+    problem = cantilever((4, 1))
+    case = case_of(problem, ts.Fem("neo-hookean"), 2)
+    before, after = (ts.solve(problem, ts.Springs(rule), case.solver) for rule in ("lloyd", "gaussian"))
+    sheet = shape_figure(CaseResult(case, False, before, after))
+    assert sheet is not None and case.reference is not None
+    drawn = {artist.get_gid(): artist.get_path().vertices for artist in sheet.artists if artist.get_gid()}
+    edges = problem.mesh.edges
+    for name, path in (("by_the_rule", before), ("calibrated", after), ("neo-Hookean_FEM", case.reference)):
+        assert drawn[name] == pytest.approx(path.states[-1].positions[edges].reshape(-1, 2))
 
 
 def test_the_result_is_a_table_figures_and_files(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ SOURCE = Path(truespring.__file__).parent
 # What each room may import of the others; arrays and errors are open to all.
 ALLOWED = {
     "__main__": {"cli"},
-    "accessor": {"material", "mesh", "models", "problem", "units"},
+    "accessor": {"material", "mesh", "models", "problem"},
     "cli": {
         "calibration",
         "comparing",
@@ -133,7 +133,7 @@ ALLOWED = {
         "study",
     },
     "sweeping": {"study", "report", "outputs"},
-    "showing": {"comparison", "mesh", "potential", "report", "solution", "units"},
+    "showing": {"comparison", "mesh", "models", "potential", "problem", "report", "solution", "units"},
     "study": {
         "outputs",
         "refining",
@@ -328,9 +328,14 @@ def rooms() -> dict[str, list[Path]]:
 
 
 @cache
+def tree_of(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+@cache
 def imported(file: Path, everywhere: bool = True, modules: frozenset[str] = frozenset()) -> set[str]:
     """Dotted names that a file imports, at its top only or everywhere; of a package those `modules` that it names."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    tree = tree_of(file)
     names: set[str] = set()
     thin = {id(method.body[-2]) for method in thin_methods(tree)}
     for node in ast.walk(tree) if everywhere else tree.body:
@@ -349,7 +354,7 @@ def thin_methods(tree: ast.Module) -> list[ast.FunctionDef]:
     """Methods that only show a value: a docstring, an import of a function of SHOWING, and its call."""
     return [
         method
-        for value in ast.walk(tree)
+        for value in tree.body
         if isinstance(value, ast.ClassDef)
         for method in value.body
         if isinstance(method, ast.FunctionDef) and is_thin(method)
@@ -377,7 +382,7 @@ def test_methods_that_show_a_value_only_call_the_room_on_top() -> None:
         (file.stem, method.name)
         for files in rooms().values()
         for file in files
-        for method in thin_methods(ast.parse(file.read_text(encoding="utf-8")))
+        for method in thin_methods(tree_of(file))
     }
     assert found >= {("solution", "plot"), ("solution", "write"), ("mesh", "to_pyvista"), ("mesh", "from_pyvista")}
     more = "class A:\n def plot(self):\n  'Plot.'\n  from truespring.showing.plotting import plot\n"
@@ -489,7 +494,7 @@ def test_what_is_imported_is_a_declared_dependency() -> None:
 def test_the_library_neither_prints_nor_exits() -> None:
     for room, files in rooms().items():
         for file in files:
-            calls = [node.func for node in ast.walk(ast.parse(file.read_text("utf-8"))) if isinstance(node, ast.Call)]
+            calls = [node.func for node in ast.walk(tree_of(file)) if isinstance(node, ast.Call)]
             named = {call.id for call in calls if isinstance(call, ast.Name)}
             assert room == "cli" or not named & {"print", "exit", "input"}, file
             assert room == "__main__" or "sys.exit" not in file.read_text(encoding="utf-8"), file

@@ -41,6 +41,7 @@ from truespring.kernels.threads import n_threads
 from truespring.report.rows import table_of
 from truespring.study import read_study, read_text, run, value_at
 from truespring.sweeping import Failure, Pool, here, plan_sweep, run_sweep
+from truespring.sweeping.figures import measured
 from truespring.sweeping.here import run_here
 from truespring.sweeping.store import FAILED, Store
 from truespring.sweeping.sweep import _outcome, solve_point
@@ -513,6 +514,22 @@ def test_the_table_has_the_figures_of_the_summary(swept: tuple[Path, dict[str, A
     assert table.columns == list(row)
     for column in ("material.poisson", "models.springs.load_factor", "comparison.linear.max_error"):
         assert table[column].to_list() == [one[column] for one in told["rows"]]
+
+
+def test_displacement_and_force_are_drawn_where_they_vary() -> None:
+    def row(young: float, moved: float, force: float) -> dict[str, Any]:
+        at_probe = {"models.a.probe_displacement.x": 3 * moved, "models.a.probe_displacement.y": 4 * moved}
+        forces = {"models.a.force.x": 0.0, "models.a.force.y": force}
+        return {"material.young": young, "status": "converged", **at_probe, **forces, "comparison.b.rms_error": 0.1}
+
+    loaded = list(measured([row(1e3, 2e-3, -5.0), row(2e3, 1e-3, -5.0)]))
+    assert [(one.title, one.label) for one in loaded] == [
+        ("Displacement of the probe", "displacement [mm]"),
+        ("Rms error", "rms error [%]"),
+    ]
+    assert loaded[0].values == {"a": [pytest.approx(10.0), pytest.approx(5.0)]}
+    moved = list(measured([row(1e3, 2e-3, 5.0), row(2e3, 2e-3, 10.0)]))
+    assert [one.title for one in moved] == ["Force", "Rms error"] and moved[0].values == {"a": [5.0, 10.0]}
 
 
 def test_the_page_loads_nothing(swept: tuple[Path, dict[str, Any], str]) -> None:

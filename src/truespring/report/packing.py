@@ -40,6 +40,15 @@ class Packing:
         """Pack node numbers, shape (n, k), as indices among the nodes that are kept."""
         return self.numbers(self._number[lines])
 
+    def cells(self, cells: Ints) -> str:
+        """Pack node numbers as `pairs` does, in two bytes each if there are few nodes."""
+        return _base64(self._number[cells].astype("<u2" if len(self.nodes) < 65536 else "<u4"))
+
+    def shares(self, values: Floats, low: float, high: float) -> str:
+        """Pack values of all nodes, shape (n_nodes,), those of the nodes that are kept in 65536 steps of a range."""
+        steps = 65535 * (values[self.nodes] - low) / (high - low)
+        return _base64(np.rint(np.nan_to_num(steps)).astype("<u2"))
+
     def numbers(self, values: Ints) -> str:
         """Pack integers unchanged."""
         return _base64(values.astype("<u4"))

@@ -93,18 +93,18 @@ def write_mesh(mesh: Mesh, file: Path, held: Bools | None = None) -> None:
     write_vtu(file, mesh.nodes, mesh.cells.items(), fields)
 
 
-def write_stl(path: Solution, file: Path) -> None:
-    """Write the deformed body of the last state as binary STL [m]; nothing without states or elements.
+def write_stl(path: Solution, file: Path, state: State | None = None) -> None:
+    """Write the deformed body of a state as binary STL [m]; nothing without states or elements.
 
     A plane body is written as its elements in the plane z = 0, one in 3D as its surface, anticlockwise from outside;
-    quadrilaterals as two triangles.
+    quadrilaterals as two triangles. By default the state is the last one.
     """
-    mesh = path.problem.mesh
-    if path.surface is not None:
-        points, triangles = path.surface.points, path.surface.triangles
+    mesh, surface = path.problem.mesh, path.surface or path.shell
+    if surface is not None:
+        points, triangles = surface.points, surface.triangles
     elif path.states and mesh.element != "line":
         facets = mesh.elements if mesh.dim == 2 else facets_of(mesh)
-        points, triangles = path.states[-1].positions, triangles_of(facets)
+        points, triangles = (state or path.states[-1]).positions, triangles_of(facets)
     else:
         return
     file.write_bytes(stl_bytes(in_space(points)[triangles]))

@@ -71,9 +71,13 @@ def arrays_of(solution: Solution) -> "xarray.Dataset":
     def stacked(name: str) -> Any:
         return np.stack([getattr(state, name) for state in states])
 
+    more: dict[str, Any] = {}
+    if states[0].moving is not None:
+        speeds = np.stack([one.moving.velocity[: mesh.n_nodes] for one in states if one.moving is not None])
+        more["velocity"] = (of_nodes, speeds, {"units": "m/s"})
+    times = [one.moving.time for one in states if one.moving is not None]
     return xarray.Dataset(
         {
-            "nodes": (("node", "component"), mesh.nodes, {"units": "m"}),
             "displacement": (of_nodes, stacked("displacement"), {"units": "m"}),
             "reaction": (of_nodes, stacked("reaction"), {"units": "N"}),
             "applied_force": (
@@ -82,12 +86,15 @@ def arrays_of(solution: Solution) -> "xarray.Dataset":
                 {"units": "N"},
             ),
             "energy": (of_levels, stacked("energy"), {"units": "J"}),
+            **more,
         },
         coords={
             "level": np.arange(len(states)),
             "node": np.arange(mesh.n_nodes),
             "component": list(AXES[: mesh.dim]),
+            **{axis: ("node", mesh.nodes[:, place], {"units": "m"}) for place, axis in enumerate(AXES[: mesh.dim])},
             "load_factor": (of_levels, stacked("load_factor"), {"units": "1"}),
+            **({"time": (of_levels, np.array(times), {"units": "s"})} if more else {}),
         },
         attrs={"label": solution.label, "status": str(solution.status)},
     )
