@@ -35,7 +35,9 @@ ALLOWED = {
         "study",
         "sweeping",
         "table1",
+        "templates",
         "validity",
+        "verifying",
         "vibration",
     },
     "live": {
@@ -133,7 +135,10 @@ ALLOWED = {
         "study",
     },
     "sweeping": {"study", "report", "outputs"},
-    "showing": {"comparison", "mesh", "models", "potential", "problem", "report", "solution", "units"},
+    "verifying": {"models", "outputs", "potential", "problem", "report", "showing", "solution", "solvers", "study"},
+    "templates": set(),
+    "versions": set(),
+    "showing": {"comparison", "mesh", "models", "outputs", "potential", "problem", "report", "solution", "units"},
     "study": {
         "outputs",
         "refining",
@@ -483,7 +488,7 @@ def test_what_is_imported_is_a_declared_dependency() -> None:
     extras = project["optional-dependencies"]
     declared = [*project["dependencies"], *(one for name in extras.keys() - {"test"} for one in extras[name])]
     modules = {"scikit-fem": "skfem", "lazy-loader": "lazy_loader", "ansys-mapdl-reader": "ansys", "pillow": "PIL"}
-    modules |= {"imageio-ffmpeg": "imageio_ffmpeg"}
+    modules |= {"imageio-ffmpeg": "imageio_ffmpeg", "ipython": "IPython"}
     names = [re.split("[<>=]", one)[0] for one in declared]
     allowed = {modules.get(name, name) for name in names} | {"truespring", *sys.stdlib_module_names}
     for files in rooms().values():

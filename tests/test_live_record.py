@@ -10,7 +10,7 @@ import truespring as ts
 from truespring.errors import LiveError, StudyError
 from truespring.live import Live
 from truespring.live.record import read_session, replay, write_session
-from truespring.study import Study, read_study, run
+from truespring.study import Study, read_study, read_text, run
 
 STUDY = """\
 title = "A block"
@@ -55,7 +55,7 @@ def study_of(folder: Path, *changes: tuple[str, str]) -> Study:
         text = text.replace(old, new)
     file = folder / "block.toml"
     file.write_text(text, encoding="utf-8")
-    return read_study(file, balanced=False)
+    return read_text(file).study(balanced=False)
 
 
 def opened(study: Study, step: float = 1e-3, **settings: Any) -> Live:

@@ -71,7 +71,7 @@ def test_csv_is_read_back_by_compare(strip: ts.Solution, tmp_path: Path) -> None
 
 
 def test_other_suffixes_and_bodies_are_errors(strip: ts.Solution, tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"x\.vtk: the suffix is \.pvd, \.vtu, .*did you mean '\.vtu'"):
+    with pytest.raises(OutputError, match=r"x\.vtk: the suffix is \.pvd, \.vtkhdf, \.vtu, .*did you mean '\.vtu'"):
         strip.write(tmp_path / "x.vtk")
     assert not list(tmp_path.iterdir())
     surface = ts.read_stl(strip.problem, strip.write(tmp_path / "strip.stl"))

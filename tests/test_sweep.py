@@ -151,7 +151,7 @@ def test_points_come_from_a_table(study: Path) -> None:
 )
 def test_any_key_can_have_another_value(tmp_path: Path, key: str, value: Any, read: Any) -> None:
     file = written(tmp_path, STUDY.replace('rule = "lloyd"', 'rule = "isotropic"'))
-    assert not read(read_study(file)) and read(read_study(file, changes={key: value}))
+    assert not read(read_study(file)) and read(read_study(file, **{key: value}))
     assert value_at(read_text(file).keys({key: value}), "load.1.on") == "right"
 
 
@@ -492,7 +492,7 @@ def test_a_failed_point_is_recorded_and_the_rest_goes_on(swept: tuple[Path, dict
 def test_the_table_has_the_figures_of_the_summary(swept: tuple[Path, dict[str, Any], str]) -> None:
     folder, told, _ = swept
     (row,) = [one for one in told["rows"] if (one["mesh.elements"], one["material.poisson"]) == ([8, 2], 0.2)]
-    result = run(read_study(folder / "study.toml", changes={"material.poisson": 0.2}))
+    result = run(read_study(folder / "study.toml", **{"material.poisson": 0.2}))
     springs, one = result.paths["springs"], result.comparisons["linear"]
     last = springs.states[-1]
     assert row["comparison.linear.rms_error"] == pytest.approx(one.rms_error, rel=1e-9)
@@ -589,7 +589,7 @@ def test_any_cluster_will_do(cluster: str, study: Path) -> None:
     theirs = ts.sweep(study, vary, scheduler=cluster).table()
     # Here, without any cluster.
     for row in theirs.iter_rows(named=True):
-        here = run(read_study(study, changes={"material.poisson": row["material.poisson"]}))
+        here = run(read_study(study, **{"material.poisson": row["material.poisson"]}))
         assert row["comparison.linear.rms_error"] == pytest.approx(here.comparisons["linear"].rms_error, rel=1e-9)
     assert theirs["material.poisson"].to_list() == [0.0, 0.1, 0.2, 0.3, 0.4]
 

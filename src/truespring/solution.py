@@ -277,9 +277,10 @@ class Solution:
     def write(self, file: str | Path, level: int = -1) -> Path:
         """Write the solution to a file, in SI units; its suffix selects the format.
 
-        .pvd: all states, one .vtu each, for ParaView, as `truespring verify` writes them. .vtu: the undeformed body
-        with the fields of one state. .stl: the deformed body of one state. .csv: position and displacement of all nodes
-        at all states, with units in the header line; `truespring compare` and `read_result` read it.
+        .pvd: all states, one .vtu each, for ParaView, as `truespring verify` writes them. .vtkhdf: the same as one file
+        of HDF5, with the undeformed body once (pip install 'truespring[vtkhdf]'). .vtu: the undeformed body with the
+        fields of one state. .stl: the deformed body of one state. .csv: position and displacement of all nodes at all
+        states, with units in the header line; `truespring compare` and `read_result` read it.
 
         Args:
             file: the file; its folder is created.

@@ -38,7 +38,22 @@ def head_note(source: str) -> str:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """The solutions and comparisons of one study.
+    """The solutions and comparisons of one study, as `ts.verify` returns them.
+
+    >>> import truespring as ts
+    >>> problem = ts.Problem(
+    ...     mesh=ts.rectangle(size=(0.04, 0.01), elements=(4, 1)),
+    ...     material=ts.Material(young=10e3, poisson=0.3),
+    ...     section=ts.PlaneStress(thickness=0.01),
+    ...     supports=[ts.Fixed(on="left")],
+    ...     loads=[ts.Force(on="right", total=(0.1, 0.0))],
+    ... )
+    >>> models = {"springs": ts.Springs(rule="gaussian"), "fem": ts.Fem(law="neo-hookean")}
+    >>> result = ts.verify(problem, models=models)
+    >>> list(result.solutions), list(result.comparisons), result.converged
+    (['springs', 'fem'], ['fem'], True)
+    >>> result.verdict.startswith("Gaussian springs")
+    True
 
     Attributes:
         title: title of the study.
@@ -88,6 +103,32 @@ class Result:
     def closest(self) -> str | None:
         """Name of the reference nearest to the model at full load."""
         return closest(self.comparisons)
+
+    @property
+    def solutions(self) -> Mapping[str, Solution]:
+        """The solution of each model, by its name: `paths`."""
+        return self.paths
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """The comparison with the reference nearest to the model at full load; None if nothing is compared."""
+        return None if self.closest is None else self.comparisons[self.closest]
+
+    @property
+    def verdict(self) -> str:
+        """How far the model may be trusted, in sentences: trouble, agreement with the references, separate errors."""
+        from truespring.showing.results import verdict_of
+
+        return verdict_of(self)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the report as one HTML file that needs no network; return its path.
+
+        Raises OutputError if it cannot be written.
+        """
+        from truespring.showing.results import write_report
+
+        return write_report(self, Path(path))
 
     @property
     def converged(self) -> bool:

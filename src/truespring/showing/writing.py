@@ -6,7 +6,7 @@ from pathlib import Path
 
 from truespring.errors import OutputError, nearest
 from truespring.mesh.selections import AXES
-from truespring.report.series import snapshot_of, write_series, write_stl
+from truespring.report.series import snapshot_of, write_series, write_stl, write_vtkhdf_series
 from truespring.showing.levels import state_of
 from truespring.solution import Solution, State
 
@@ -24,6 +24,10 @@ def write_solution(solution: Solution, file: Path, level: int) -> Path:
 
 def _write_pvd(solution: Solution, file: Path, state: State | None) -> None:
     write_series(solution, file.parent, file.stem)
+
+
+def _write_vtkhdf(solution: Solution, file: Path, state: State | None) -> None:
+    write_vtkhdf_series(solution, file)
 
 
 def _write_vtu(solution: Solution, file: Path, state: State | None) -> None:
@@ -56,6 +60,7 @@ def _write_csv(solution: Solution, file: Path, state: State | None) -> None:
 
 _WRITERS: dict[str, Callable[[Solution, Path, State | None], None]] = {
     ".pvd": _write_pvd,
+    ".vtkhdf": _write_vtkhdf,
     ".vtu": _write_vtu,
     ".stl": _write_stl,
     ".csv": _write_csv,

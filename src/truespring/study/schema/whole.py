@@ -12,6 +12,7 @@ from truespring.mesh import Mesh, named_point, nearest_node, select
 from truespring.models import Model
 from truespring.problem import Problem
 from truespring.solvers import ArcLength, DisplacementControl, Newton, Solver
+from truespring.study.case import compared_model
 from truespring.study.places import Places
 from truespring.study.schema.body import AnyLoad, MaterialKeys, RegionKeys, SectionKeys, SupportKeys
 from truespring.study.schema.meshes import AnyMesh
@@ -185,8 +186,7 @@ class CompareKeys(Keys):
 
     def names(self, places: Places, models: Mapping[str, Model]) -> tuple[str, tuple[str, ...]]:
         """Return the name of the compared model, by default the first springs, and those of its references."""
-        springs = [name for name, model in models.items() if model.has_springs]
-        compared = self.model or (springs or list(models))[0]
+        compared = self.model or compared_model(models)
         self._check_known(places, "model", compared, models)
         if self.references is None:
             return compared, tuple(name for name in models if name != compared)
