@@ -170,6 +170,8 @@ def test_a_solution_as_a_grid_has_the_fields_of_its_files(bent: ts.Solution, tmp
     assert warped.warp_by_vector("displacement", factor=-1).points[:, :2] == pytest.approx(
         bent.problem.mesh.nodes, abs=1e-8
     )
+    markers = ts.read_result(bent.write(tmp_path / "x.csv")).to_pyvista()
+    assert set(markers.celltypes) == {1} and markers.n_cells == bent.problem.mesh.n_nodes
     with pytest.raises(OutputError, match=r"level = 7: springs \(gaussian\) has 3 states, 0 to 2, or -1"):
         bent.to_pyvista(level=7)
     with pytest.raises(OutputError, match=r"level = 0\.5: the number of a state is expected, 0 to 2"):

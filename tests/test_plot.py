@@ -1,5 +1,6 @@
 """Pictures of solutions in axes of matplotlib, by what the axes hold."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from PIL import Image
 import truespring as ts
 from tests.test_solution_files import solved
 from truespring.errors import MeshError, OutputError
+from truespring.showing.frames import curves_of
 
 matplotlib.use("agg")
 
@@ -187,6 +189,10 @@ def test_what_cannot_be_drawn_is_an_error(springs: ts.Solution, block: ts.Soluti
         springs.plot(color="strech")
     with pytest.raises(OutputError, match=r"color = 'distance' needs a reference: plot\(over=reference"):
         springs.plot(color="distance")
+    with pytest.raises(OutputError, match=r"over = 'stress': a Solution is expected; a quantity is given as color="):
+        springs.plot("stress")  # type: ignore[arg-type]
+    with pytest.raises(OutputError, match=r"ax has three axes: .* leave projection out"):
+        block.plot(ax=Figure().add_subplot(projection="3d"))
     with pytest.raises(OutputError, match=r"has 2 dimensions, .* 3: they cannot be drawn in one picture"):
         springs.plot(over=block)
     others = ts.solve(springs.problem, ts.Springs("lloyd"), ts.Newton(3))
@@ -247,3 +253,11 @@ def test_a_problem_shows_loads_and_springs(size: tuple[float, ...]) -> None:
 
     plain, sprung = (problem.plot(model, ax=Figure().subplots()) for model in (None, ts.Springs("gaussian")))
     assert count(plain, load) > 200 and count(plain, blue) == 0 and count(sprung, blue) > 200
+
+
+def test_curves_have_each_line_once() -> None:
+    branched = np.array([[0, 1], [2, 1], [2, 3], [3, 0], [1, 3], [5, 6], [6, 7], [7, 5], [8, 9]])
+    curves = curves_of(branched)
+    lines = [frozenset(pair) for curve in curves for pair in pairwise(curve)]
+    assert len(lines) == len(branched) and set(lines) == {frozenset(pair) for pair in branched.tolist()}
+    assert sorted(map(len, curves)) == [2, 2, 4, 5]  # two between 1 and 3, a triangle, a line

@@ -88,6 +88,10 @@ def test_the_table_has_closed_forms(strip: ts.Solution, monkeypatch: pytest.Monk
     assert table.attrs["units"]["energy"] == "J" and table["load_factor"].tolist() == [0.0, 0.5, 1.0]
     assert (table[["ux", "uy"]] == 0).all(axis=None)  # node 0 is clamped
     assert table["fy"].to_numpy() == pytest.approx([0.0, -0.005, -0.01]) and set(table["state"]) == {"stable"}
+    tip, near = strip.table("right-middle"), strip.table((0.039, 0.0051))
+    assert (tip == near).all(axis=None) and tip["uy"].iloc[-1] < -0.001
+    with pytest.raises(OutputError, match=r"probe = 27: nodes are 0 to 26; or a point such as 'right-middle'"):
+        strip.table(27)
     moved = strip.table()  # of the node that moves most
     largest = np.linalg.norm(strip.states[-1].displacement, axis=1).max()
     assert np.hypot(*moved[["ux", "uy"]].iloc[-1]) == pytest.approx(largest)

@@ -1,6 +1,7 @@
 """The result of solve: a Solution, its States, and the Status in which it ended."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -319,7 +320,7 @@ class Solution:
 
         return solution_grid(self, level, warped)
 
-    def table(self, probe: int | None = None) -> Any:
+    def table(self, probe: int | str | Sequence[float] | None = None) -> Any:
         """Return a table with one row for each state: a pandas DataFrame, of polars if pandas is not installed.
 
         Columns: load_factor, in a motion time [s], displacement of the probe ux, uy[, uz] [m], applied force fx, fy[,
@@ -327,12 +328,13 @@ class Solution:
         stable, unstable or the kind of a critical point. The units are in `attrs["units"]` of a pandas table.
 
         Args:
-            probe: number of a node; by default the node that moves most.
+            probe: number of a node, a point such as "right-middle", or a position [m], whose nearest node is taken; by
+                default the node that moves most.
 
-        Raises OutputError if neither library is installed, or the solution has no states.
+        Raises OutputError if neither library is installed, the solution has no states, or there is no such node.
 
         Example:
-            >>> table = solution.table(probe=84)
+            >>> table = solution.table(probe="right-middle")
             >>> table[["load_factor", "fy", "state"]]
                load_factor      fy   state
             0          0.0  0.0000  stable

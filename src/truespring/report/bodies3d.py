@@ -29,7 +29,7 @@ from truespring.report.shades import draw_shaded_dots
 from truespring.report.sheet import Area
 from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, error_colors, full_name
 from truespring.report.supports3d import clamped_nodes, draw_supports
-from truespring.report.surfaces import edges_of, facets_of, lines_on, normals, outline, seen
+from truespring.report.surfaces import VIEW, edges_of, facets_of, lines_on, normals, outline, seen
 from truespring.report.symbols import Arrow, draw_dot, draw_drive, draw_loaded, draw_outside, find_arrows
 from truespring.report.touching import drawn_tools, entries, near, with_tools
 from truespring.report.undeformed import Undeformed
@@ -47,7 +47,7 @@ def undeformed_picture(body: Undeformed) -> Picture:
     mesh = problem.mesh
     size = float((mesh.upper - mesh.lower).max())
     points, facets = seen(mesh.nodes), facets_of(mesh)
-    arrows = find_arrows(problem, size, lambda places: seen(places)[:, :2])
+    arrows = find_arrows(problem, size, lambda places: seen(places)[:, :2], VIEW[2])
     layers = []
     if len(facets):
         layers.append(solid(points, facets, _tinted(problem, facets, arrows), edges_of(facets), INK, 1.0))

@@ -52,8 +52,8 @@ class Result:
     >>> result = ts.verify(problem, models=models)
     >>> list(result.solutions), list(result.comparisons), result.converged
     (['springs', 'fem'], ['fem'], True)
-    >>> result.verdict.startswith("Gaussian springs")
-    True
+    >>> result.verdict
+    'Up to full load springs stay within 5 % of neo-Hookean FEM. ...'
 
     Attributes:
         title: title of the study.

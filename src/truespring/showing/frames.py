@@ -28,6 +28,8 @@ _DPI, _IMAGE = 200, 6.0
 # Faces beyond this number are drawn by PyVista, whose process takes seconds to start.
 _MANY_FACES = 20_000
 _TRIAD = "#3d4248"
+# Width of a letter of a title [inch], and of the line of a name in letters.
+_LETTER, _HANDLE = 0.078, 8
 
 
 class Entry(NamedTuple):
@@ -112,6 +114,33 @@ def draw_lines(
     axes.add_collection(LineCollection(ends, colors=color, linewidths=width, zorder=zorder, gid=name, **more))
 
 
+def draw_dashes(axes: "Axes", points: Floats, pairs: Ints, color: str, width: float, zorder: float, name: str) -> None:
+    """Draw lines between points as dashed curves through several of them, as dashes restart in each curve."""
+    from matplotlib.collections import LineCollection
+
+    curves = [points[nodes][:, :2] for nodes in curves_of(pairs)]
+    style: Any = {"linestyle": (0, (3, 2)), "zorder": zorder, "gid": name}
+    axes.add_collection(LineCollection(curves, colors=color, linewidths=width, **style))
+
+
+def curves_of(pairs: Ints) -> list[list[int]]:
+    """Return curves through the ends of lines, shape (n, 2): each line is in one curve, once."""
+    beside: dict[int, list[int]] = {}
+    for one, other in pairs.tolist():
+        beside.setdefault(one, []).append(other)
+        beside.setdefault(other, []).append(one)
+    curves = []
+    for start in sorted(beside, key=lambda node: len(beside[node]) == 2):  # closed curves last
+        while beside[start]:
+            curve = [start]
+            while beside[curve[-1]] and (len(curve) == 1 or len(beside[curve[-1]]) == 1):
+                following = beside[curve[-1]].pop()
+                beside[following].remove(curve[-1])
+                curve.append(following)
+            curves.append(curve)
+    return curves
+
+
 def thinner(n_lines: int) -> float:
     """Return the factor of the width of many lines."""
     return float(np.clip((_MANY / max(n_lines, 1)) ** 0.5, 0.3, 1.0))
@@ -123,12 +152,22 @@ def draw_dots(axes: "Axes", points: Floats, zorder: float, name: str, **style: A
     return axes.scatter(points[:, 0], points[:, 1], s=16, zorder=zorder, gid=name, **rim, **style)
 
 
-def draw_legend(axes: "Axes", title: str, entries: Sequence[Entry]) -> None:
-    """Write a title and names above the axes."""
+def _wrapped(words: Sequence[str], most: int) -> str:
+    """Return words as one line, or as several of at most some letters."""
+    lines = list(words[:1])
+    for word in words[1:]:
+        longer = f"{lines[-1]} · {word}"
+        lines[-1:] = [longer] if len(longer) <= most else [lines[-1], word]
+    return "\n".join(lines)
+
+
+def draw_legend(axes: "Axes", words: Sequence[str], entries: Sequence[Entry]) -> None:
+    """Write a title and names above the axes, in as many lines as their width needs."""
     from matplotlib.lines import Line2D
 
-    letters = sum(len(entry.text) + 8 for entry in entries)
-    rows = -(-letters // 90)
+    wide = axes.get_position().width * float(axes.figure.get_figwidth())  # [inch], before constraints of the layout
+    title = _wrapped(words, int(wide / _LETTER))
+    rows = -(-sum(len(entry.text) + _HANDLE for entry in entries) // int(1.5 * wide / _LETTER))
     legend: Any = axes.legend(
         handles=[Line2D([], [], color=one.color, ls=one.style, lw=one.width, label=one.text) for one in entries],
         title=title,

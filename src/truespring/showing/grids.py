@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 _Arrays = Mapping[str, NDArray[Any]]
 
+# VTK's type of each kind of cell.
+_TYPES = {"vertex": 1, **{kind: shape.vtk_type for kind, shape in CELL_SHAPES.items()}}
+
 # Cells of second order, by those of first order: of triangles and tetrahedra with middle nodes.
 _SECOND_ORDER = {"triangle": "triangle6", "tetra": "tetra10"}
 
@@ -28,9 +31,15 @@ def solution_grid(solution: Solution, level: int, warped: bool) -> "pyvista.Unst
     state = state_of(solution, level) if solution.states else None
     snapshot = snapshot_of(solution, state)
     points = in_space(snapshot.points)
+    cells = _vertices(len(points)) if solution.is_cloud else snapshot.cells
     if warped and state is not None:
         points = points + snapshot.point_arrays["displacement"]
-    return _grid(points, snapshot.cells, snapshot.point_arrays, snapshot.cell_arrays)
+    return _grid(points, cells, snapshot.point_arrays, snapshot.cell_arrays)
+
+
+def _vertices(n_points: int) -> list[tuple[str, Ints]]:
+    """Return a cell for each point."""
+    return [("vertex", np.arange(n_points)[:, None])]
 
 
 def mesh_grid(mesh: Mesh) -> "pyvista.UnstructuredGrid":
@@ -79,7 +88,7 @@ def _grid(
         raise OutputError("PyVista is not installed: pip install 'truespring[3d]'") from None
     blocks = [(kind, nodes[:, WEDGE] if kind == "wedge" else nodes) for kind, nodes in cells]
     listed = [np.column_stack([np.full(len(nodes), nodes.shape[1]), nodes]).ravel() for _, nodes in blocks]
-    types = [np.full(len(nodes), CELL_SHAPES[kind].vtk_type, dtype=np.uint8) for kind, nodes in blocks]
+    types = [np.full(len(nodes), _TYPES[kind], dtype=np.uint8) for kind, nodes in blocks]
     none = np.zeros(0, dtype=np.int64)
     grid = pyvista.UnstructuredGrid(np.concatenate([none, *listed]), np.concatenate([none, *types]), points)
     grid.point_data.update(dict(point_arrays))

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Bools, Floats, Ints
 from truespring.errors import MeshError
 from truespring.mesh import Mesh, loaded, select_elements
-from truespring.mesh.facets import find_facets
+from truespring.mesh.facets import facet_keys, find_facets
+from truespring.mesh.rows import distinct_rows
 from truespring.mesh.selections import SIDES, named_facets
 from truespring.report.bodies3d import BODY, one_color, solid
 from truespring.report.render import Layer, rgb
@@ -54,7 +55,7 @@ def plot_mesh(mesh: Mesh, names: Sequence[str] | None, axes: "Axes | None") -> "
     low, high = low - margin, high + margin
     axes = new_axes(low, high) if axes is None else axes
     (_draw_plane if mesh.dim == 2 else _draw_space)(axes, mesh, points, marked, low, high)
-    title = f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.kinds}"
+    title = [f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements: {mesh.kinds}"]
     draw_legend(axes, title, [Entry(one.name, one.color, "-", 3.0) for one in marked])
     return axes
 
@@ -120,13 +121,17 @@ def _draw_space(axes: "Axes", mesh: Mesh, points: Floats, marked: list[_Marked],
             draw_dots(axes, points[one.nodes], 4, one.name, color=one.color)
 
 
+def _among(facets: Ints, others: Ints) -> Bools:
+    """Return whether each facet is one of the others, whatever the order of its corners, shape (n_facets,)."""
+    both = distinct_rows(facet_keys(np.concatenate([facets, others]).T)).of
+    return np.isin(both[: len(facets)], both[len(facets) :])
+
+
 def _layers(mesh: Mesh, points: Floats, facets: Ints, marked: list[_Marked]) -> list[Layer]:
     """Return the surface, coloured where named parts are, with its edges."""
     colors = one_color(facets, BODY).copy()
     owners = find_facets(mesh.elements, mesh.element, facets)[:, 0]
-    keys = [frozenset(facet) for facet in facets.tolist()]
     for one in _largest_first(marked):
-        acted = {frozenset(facet) for facet in one.facets.tolist()}
-        here = np.isin(owners, one.elements) | np.array([key in acted for key in keys], dtype=bool)
+        here = np.isin(owners, one.elements) | _among(facets, one.facets)
         colors[here] = 0.35 * rgb(BODY) + 0.65 * rgb(one.color)
     return [solid(points, facets, colors, edges_of(facets), INK, 0.5)]

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from truespring.comparison import TOLERANCE, compare, most_moved
-from truespring.errors import OutputError
+from truespring.errors import OutputError, shown
 from truespring.report.result import Result
 from truespring.solution import SAME_LEVEL, Solution, State
 
@@ -40,6 +40,8 @@ def states_of_both(solution: Solution, over: Solution | None) -> tuple[State, ..
     """
     if over is None:
         return solution.states
+    if not isinstance(over, Solution):
+        raise OutputError(f"over = {shown(over)}: a Solution is expected; a quantity is given as color='stress'")
     if over.problem.mesh.dim != solution.problem.mesh.dim:
         raise OutputError(
             f"{solution.label} has {solution.problem.mesh.dim} dimensions, {over.label} {over.problem.mesh.dim}: they "

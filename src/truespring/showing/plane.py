@@ -6,7 +6,7 @@ import numpy as np
 
 from truespring.mesh.facets import triangles_of
 from truespring.report.style import BLUE, FAINT, INK, MOTION
-from truespring.showing.frames import draw_dots, draw_lines, frame_plane, thinner
+from truespring.showing.frames import draw_dashes, draw_dots, draw_lines, frame_plane, thinner
 from truespring.showing.paints import Paint
 from truespring.showing.scales import add_bar, colors_of, range_of
 from truespring.showing.scenes import Scene
@@ -14,8 +14,7 @@ from truespring.showing.scenes import Scene
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Dashes of undeformed bodies, and width of lines [points].
-DASHES = (0, (3, 2))
+# Width of lines [points].
 _MODEL, _REFERENCE, _RIM = 0.9, 1.4, 1.0
 # Most edges of elements that are drawn over colours.
 _MOST_EDGES = 4000
@@ -46,7 +45,7 @@ def draw_rest(axes: "Axes", scene: Scene) -> None:
     if rest is not None and rest.is_cloud:
         draw_dots(axes, rest.points, 1, "undeformed", color=FAINT)
     elif rest is not None:
-        draw_lines(axes, rest.points, rest.outline, FAINT, _RIM, 1, "undeformed", linestyle=DASHES)
+        draw_dashes(axes, rest.points, rest.outline, FAINT, _RIM, 1, "undeformed")
 
 
 def draw_colored_lines(axes: "Axes", scene: Scene, paint: Paint) -> Any:
@@ -62,7 +61,7 @@ def draw_colored_lines(axes: "Axes", scene: Scene, paint: Paint) -> Any:
         array=values[order],
         cmap=colors_of(paint),
         norm=range_of(paint),
-        linewidths=1.4 * thinner(len(pairs)),
+        linewidths=1.4 * max(0.6, thinner(len(pairs))),
         zorder=3,
         gid="colors",
     )
@@ -83,7 +82,9 @@ def _draw_colors(axes: "Axes", scene: Scene, paint: Paint) -> Any:
         return draw_colored_lines(axes, scene, paint)
     drawn: Any
     if paint.on == "elements":
-        drawn = PolyCollection(list(points[mesh.elements]), array=paint.values, linewidths=0, zorder=2, **style)
+        drawn = PolyCollection(
+            list(points[mesh.elements]), array=paint.values, linewidths=0, antialiaseds=False, zorder=2, **style
+        )
         axes.add_collection(drawn)
     else:
         body = Triangulation(points[:, 0], points[:, 1], triangles_of(mesh.elements))

@@ -24,9 +24,6 @@ from truespring.solution import Solution, State
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Characters of a line of the title.
-_LINE = 64
-
 
 def plot_solution(
     solution: Solution,
@@ -37,6 +34,10 @@ def plot_solution(
     axes: "Axes | None",
 ) -> "Axes":
     """Draw a state of a solution into axes, see `Solution.plot`."""
+    if hasattr(axes, "get_zlim"):
+        raise OutputError(
+            "ax has three axes: bodies in space are drawn as an image in plane ones: leave projection out"
+        )
     if not solution.states:
         return _plot_surface(solution, over, color, axes)
     state = numbered(states_of_both(solution, over), level, solution)
@@ -57,7 +58,7 @@ def plot_solution(
     head = [solution.label] if color else []
     head += [_level_words(result, state)]
     head += [f"displacements {times(factor)}"] if factor != 1 else []
-    return _draw(scene, _wrapped(head), names, axes)
+    return _draw(scene, head, names, axes)
 
 
 def _plot_surface(solution: Solution, over: Solution | None, color: str | None, axes: "Axes | None") -> "Axes":
@@ -67,7 +68,7 @@ def _plot_surface(solution: Solution, over: Solution | None, color: str | None, 
             f"{solution.label} is a surface without displacements: draw it alone, or as the reference: plot(over=...)"
         )
     scene = Scene(mesh=solution.problem.mesh, rest=None, mine=shape_of(solution, None, 1.0))
-    return _draw(scene, solution.label, [Entry(solution.label, BLUE)], axes)
+    return _draw(scene, [solution.label], [Entry(solution.label, BLUE)], axes)
 
 
 def _factor(result: Result, over: Solution | None, magnify: float | None) -> float:
@@ -95,16 +96,7 @@ def _level_words(result: Result, state: State) -> str:
     return axis_of(result).words(state.level).capitalize()
 
 
-def _wrapped(words: list[str]) -> str:
-    """Return words as one line, or several that fit in the width of a figure."""
-    lines = [words[0]]
-    for word in words[1:]:
-        longer = f"{lines[-1]} · {word}"
-        lines[-1:] = [longer] if len(longer) <= _LINE else [lines[-1], word]
-    return "\n".join(lines)
-
-
-def _draw(scene: Scene, title: str, names: list[Entry], axes: "Axes | None") -> "Axes":
+def _draw(scene: Scene, title: list[str], names: list[Entry], axes: "Axes | None") -> "Axes":
     axes = new_axes(*scene.box, has_bar=scene.paint is not None) if axes is None else axes
     (draw_plane if scene.is_plane else draw_space)(axes, scene)
     draw_legend(axes, title, names)

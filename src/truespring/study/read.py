@@ -119,7 +119,7 @@ def read_study(file: str | Path, /, **changes: Any) -> Study:
     >>> file = ts.new("strip", pathlib.Path(tempfile.mkdtemp()) / "strip.toml")
     >>> study = ts.read_study(file, **{"material.poisson": 0.4, "material.young": "8 kPa"})
     >>> study.problem.material
-    Material(young=8000.0, poisson=0.4)
+    Material(young=8000.0, poisson=0.4, ...)
     """
     return read_text(file).study(changes)
 
