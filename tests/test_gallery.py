@@ -23,7 +23,7 @@ def text_of(script: Path) -> str:
 
 
 def test_the_gallery_has_a_header_and_scripts() -> None:
-    assert len(SCRIPTS) >= 8
+    assert len(SCRIPTS) >= 14
     assert (GALLERY / "GALLERY_HEADER.rst").read_text(encoding="utf-8").startswith("Gallery\n=====")
 
 

@@ -74,6 +74,7 @@ ALLOWED = {
         "conditions",
     },
     "validity": {
+        "showing",
         "sweeping",
         "outputs",
         "study",
@@ -92,6 +93,7 @@ ALLOWED = {
         "conditions",
     },
     "calibration": {
+        "showing",
         "carrying",
         "comparison",
         "support_errors",

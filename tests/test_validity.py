@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from html import escape
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -65,6 +66,7 @@ def _lattice(strain: float, rule: str) -> tuple[float, float]:
 def test_tension_is_the_closed_form_of_lattice_and_law(study: Path, law: str) -> None:
     """Both moved between smooth plates: uniform stress; they differ in the force and in the stretch across."""
     found = map_validity(study, law=law, loads=["stretch"], rules=list(LATTICES), y=None)
+    assert escape(found.verdicts[0]) in found._repr_html_() and "data:image/png;base64," in found._repr_html_()
     nodes = found.body.problem.mesh.nodes
     # Two corners are held along by the plates and across by the plane below: they tell nothing of a model.
     corners = np.isin(nodes[:, 0], [nodes[:, 0].min(), nodes[:, 0].max()]) & (nodes[:, 1] == nodes[:, 1].min())

@@ -365,6 +365,12 @@ class Solution:
 
         return arrays_of(self)
 
+    def _repr_html_(self) -> str:
+        """Return the solution as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
+
     def plot(
         self,
         over: "Solution | None" = None,

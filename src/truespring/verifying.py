@@ -153,7 +153,7 @@ def _written(
 
     def known(name: str, path: Solution) -> None:
         with writing(out):
-            write_model(path, opened, name)
+            write_model(path, opened, name, case.form)
 
     with opened:
         with shown() as advance:
