@@ -24,6 +24,9 @@ _SHADES, _COLORS = (1.0, 0.65, 0.3), {2: 8, 3: 32}
 # Frames, resolution [pixels/inch], duration of all frames [s], shortest and longest of a frame [ms].
 FRAMES, _DPI, _LASTS, _SHORTEST, _LONGEST = 60, 80, 4.0, 40, 400
 
+# Colours beyond this in red, green and blue are white.
+_ALMOST_WHITE = 0.97
+
 # Largest size of the bodies in space that are rendered at once [bytes].
 _MOST = 200_000_000
 
@@ -95,7 +98,8 @@ def common_colors(reel: Reel, frames: list[NDArray[np.uint8]]) -> Floats:
     n_colors = _COLORS[reel.mesh.dim]
     middle = Image.fromarray(frames[len(frames) // 2])
     listed = middle.quantize(n_colors, dither=Image.Dither.NONE).getpalette() or []
-    return np.array(listed[: 3 * n_colors]).reshape(-1, 3) / 255
+    found = np.array(listed[: 3 * n_colors]).reshape(-1, 3) / 255
+    return np.asarray(found[found.min(axis=1) < _ALMOST_WHITE])  # Pillow would take them for the white of the paper
 
 
 def write_gif(frames: list[NDArray[np.uint8]], file: Path, colors: Floats) -> None:
