@@ -185,7 +185,7 @@ def bending() -> Figure:
     depth = np.arange(1, 13)
     for rule, color in (("lloyd", BLUE), ("isotropic", RED)):
         moduli = ts.moduli(plate(), ts.Springs(rule))
-        ax.plot(depth, [moduli.bending[n] if n in moduli.bending else np.nan for n in depth], "o", color=color)
+        ax.plot(depth, [moduli.bending.get(n, np.nan) for n in depth], "o", color=color)
         a, b = (5 / 16, 7 / 16) if rule == "lloyd" else (3 / 8, 3 / 8)
         young = 4 * a * (a + b) / (2 * a + b)
         ax.plot(depth, young * (1 - 1 / depth**2) + 6 * a / depth**2, color=color, label=rule)

@@ -398,6 +398,7 @@ def test_a_curve_tells_how_far_the_load_went_by_itself(tmp_path: Path) -> None:
             read_curve(file, problem, 7)
 
 
+@pytest.mark.verification
 def test_springs_that_turn_inside_out_are_none_unless_the_rule_does_so_too() -> None:
     problem = cantilever(loads=(), displacement=(0.0, 0.2))
     case = case_of(problem, ts.Fem("neo-hookean"), 2)

@@ -102,6 +102,7 @@ def test_lloyd_is_soft_at_small_strain_and_meets_linear_fem_at_30_percent(
     assert 1 + deviation.stiffness_on_grid[at] == pytest.approx(0.29976 / 0.3, abs=1e-4)
 
 
+@pytest.mark.verification
 def test_bending_is_best_at_three_elements_for_lloyd_and_falls_for_isotropic(bent: Validity) -> None:
     lloyd, isotropic = bent.maps
     assert lloyd.y[int(lloyd.errors[:, 0].argmin())] == 3
@@ -421,6 +422,7 @@ def test_a_range_counts_values(study: Path) -> None:
         read_range("poisson=0:0.4:1")
 
 
+@pytest.mark.verification
 def test_a_valley_between_two_rows_is_not_filled(study: Path) -> None:
     """Where springs cross the reference at another strain for each Poisson's ratio, they do so between two as well."""
     (one,) = map_validity(
