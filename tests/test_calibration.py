@@ -193,6 +193,7 @@ def test_hourglass_at_the_limit_of_stability_is_a_warning(known: float, warned: 
     problem = Problem(box, ts.Material(10e3, 0.3), supports=[ts.Fixed("left")], loads=[load])
     case = case_of(problem, ts.Springs("gaussian", hourglass=known), 1)
     found = ts.calibrate(case, ts.Springs("gaussian"), regularisation=0.0)
+    assert found.headline in found._repr_html_() and "data:image/png;base64," in found._repr_html_()
     assert found.model.hourglass == pytest.approx(known, abs=1e-3)  # type: ignore[attr-defined]
     assert any("limit of stability, 0.5" in one for one in found.warnings) == warned
 
@@ -397,6 +398,7 @@ def test_a_curve_tells_how_far_the_load_went_by_itself(tmp_path: Path) -> None:
             read_curve(file, problem, 7)
 
 
+@pytest.mark.verification
 def test_springs_that_turn_inside_out_are_none_unless_the_rule_does_so_too() -> None:
     problem = cantilever(loads=(), displacement=(0.0, 0.2))
     case = case_of(problem, ts.Fem("neo-hookean"), 2)

@@ -269,7 +269,7 @@ def test_the_organ_in_calculix(share: float, rms: float, probe: float, tmp_path:
         "support.2.displacement": [0.003 * share, -0.006 * share, 0.0],
         "load.1.gravity": [0.0, -9.81 * share, 0.0],
     }
-    (written,) = export_study(read_study(EXAMPLES / "organ.toml", changes=changes), ["calculix"], tmp_path)
+    (written,) = export_study(read_study(EXAMPLES / "organ.toml", **changes), ["calculix"], tmp_path)
     deck = next(file for file in written.files if file.name == "twin.inp")
     found = displacements(deck.read_text(), tmp_path)[-1]
     assert distance(written.exported, found) < rms

@@ -74,6 +74,7 @@ ALLOWED = {
         "conditions",
     },
     "validity": {
+        "showing",
         "sweeping",
         "outputs",
         "study",
@@ -92,6 +93,7 @@ ALLOWED = {
         "conditions",
     },
     "calibration": {
+        "showing",
         "carrying",
         "comparison",
         "support_errors",
@@ -134,7 +136,7 @@ ALLOWED = {
         "report",
         "study",
     },
-    "sweeping": {"study", "report", "outputs"},
+    "sweeping": {"study", "report", "outputs", "showing"},
     "verifying": {"models", "outputs", "potential", "problem", "report", "showing", "solution", "solvers", "study"},
     "templates": set(),
     "versions": set(),
@@ -338,12 +340,18 @@ def tree_of(file: Path) -> ast.Module:
 
 
 @cache
+def nodes_of(file: Path) -> list[ast.AST]:
+    """Imports and calls of a file, found in one walk."""
+    return [node for node in ast.walk(tree_of(file)) if isinstance(node, ast.Import | ast.ImportFrom | ast.Call)]
+
+
+@cache
 def imported(file: Path, everywhere: bool = True, modules: frozenset[str] = frozenset()) -> set[str]:
     """Dotted names that a file imports, at its top only or everywhere; of a package those `modules` that it names."""
     tree = tree_of(file)
     names: set[str] = set()
     thin = {id(method.body[-2]) for method in thin_methods(tree)}
-    for node in ast.walk(tree) if everywhere else tree.body:
+    for node in nodes_of(file) if everywhere else tree.body:
         if id(node) in thin:
             continue
         if isinstance(node, ast.Import):
@@ -499,7 +507,7 @@ def test_what_is_imported_is_a_declared_dependency() -> None:
 def test_the_library_neither_prints_nor_exits() -> None:
     for room, files in rooms().items():
         for file in files:
-            calls = [node.func for node in ast.walk(tree_of(file)) if isinstance(node, ast.Call)]
+            calls = [node.func for node in nodes_of(file) if isinstance(node, ast.Call)]
             named = {call.id for call in calls if isinstance(call, ast.Name)}
             assert room == "cli" or not named & {"print", "exit", "input"}, file
             assert room == "__main__" or "sys.exit" not in file.read_text(encoding="utf-8"), file

@@ -137,7 +137,9 @@ def test_a_session_that_begins_with_a_pull(tmp_path: Path) -> None:
     assert away(solved(tmp_path, live), live) < 1e-12
 
 
-@pytest.mark.parametrize("changes", [[], [("young", 2.0), ("damping", 5.0)]])
+@pytest.mark.parametrize(
+    "changes", [pytest.param([], marks=pytest.mark.verification), [("young", 2.0), ("damping", 5.0)]]
+)
 def test_a_replay_is_the_session_bit_for_bit(tmp_path: Path, changes: list[tuple[str, float]]) -> None:
     live = opened(study_of(tmp_path), frame=0.01)
     for kind, value in changes:

@@ -225,6 +225,7 @@ def test_a_job_is_read_as_it_was_written(tmp_path: FilePath) -> None:
 
 
 @pytest.mark.skipif(importlib.util.find_spec("pyvista") is None, reason="PyVista is not installed")
+@pytest.mark.verification
 def test_pyvista_and_matplotlib_draw_the_same() -> None:
     found = result(body("tetrahedron", (8, 2, 4)))
     comparison = found.comparisons["linear"]

@@ -142,7 +142,7 @@ window.truespringScene = (canvas, data, bar) => {
     if (name === "displacement") return { title: name + of, unit: data.unit, low: 0, high: length * largest, value: apart(own, data.rest) };
     const field = data.fields.find((one) => one.name === name), level = path.levels.findIndex((one) => Math.abs(one - model.levels[shown.level]) < 1e-9);
     const steps = path.fields[name] && path.fields[name][level];
-    return field && steps ? { ...field, title: field.label + of, value: (i) => field.low + ((field.high - field.low) * steps[i]) / 65535 } : null;
+    return field && steps ? { ...field, title: field.label + of, value: (i) => field.low + ((field.high - field.low) * steps[i]) / field.steps } : null;
   }
 
   // The largest displacement of all paths that stay in the picture, in steps.

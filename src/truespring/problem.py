@@ -147,6 +147,12 @@ class Problem:
                 )
         _ = self.loading
 
+    def _repr_html_(self) -> str:
+        """Return the problem as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
+
     def plot(self, model: Any = None, ax: "Axes | None" = None) -> "Axes":
         """Draw the undeformed body with supports, loads and tools, as `truespring check` does.
 

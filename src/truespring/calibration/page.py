@@ -37,11 +37,17 @@ def calibration_table(title: str, found: Fitted) -> "Table":
         ("calibrated", "right"),
     ):
         table.add_column(name, justify="right" if justify == "right" else "left")
-    for row in _rows(found):
-        table.add_row(
-            row["name"], "held out" if row["held_out"] else "fitted", row["quantity"], row["before"], row["after"]
-        )
+    for row in case_rows(found):
+        table.add_row(*row)
     return table
+
+
+def case_rows(found: Fitted) -> list[tuple[str, ...]]:
+    """Return for each load case and quantity its name, whether it was fitted, the quantity, and both errors."""
+    return [
+        (row["name"], "held out" if row["held_out"] else "fitted", row["quantity"], row["before"], row["after"])
+        for row in _rows(found)
+    ]
 
 
 def _rows(found: Fitted) -> list[dict[str, Any]]:

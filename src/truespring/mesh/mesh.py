@@ -193,6 +193,12 @@ class Mesh:
 
         return mesh_grid(self)
 
+    def _repr_html_(self) -> str:
+        """Return the mesh as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
+
     def plot(self, names: Sequence[str] | None = None, ax: "Axes | None" = None) -> "Axes":
         """Draw the mesh by matplotlib, with named parts in colours.
 

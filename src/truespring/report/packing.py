@@ -44,10 +44,13 @@ class Packing:
         """Pack node numbers as `pairs` does, in two bytes each if there are few nodes."""
         return _base64(self._number[cells].astype("<u2" if len(self.nodes) < 65536 else "<u4"))
 
-    def shares(self, values: Floats, low: float, high: float) -> str:
-        """Pack values of all nodes, shape (n_nodes,), those of the nodes that are kept in 65536 steps of a range."""
-        steps = 65535 * (values[self.nodes] - low) / (high - low)
-        return _base64(np.rint(np.nan_to_num(steps)).astype("<u2"))
+    def shares(self, values: Floats, low: float, high: float, steps: int) -> str:
+        """Pack values of all nodes, shape (n_nodes,), those of the nodes that are kept, in `steps` of a range.
+
+        They take one byte each with up to 255 steps, else two.
+        """
+        found = np.rint(np.nan_to_num(steps * (values[self.nodes] - low) / (high - low)))
+        return _base64(found.astype("u1" if steps < 256 else "<u2"))
 
     def numbers(self, values: Ints) -> str:
         """Pack integers unchanged."""

@@ -258,7 +258,7 @@ def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
         "fit": result.fitness[name].fit if name in result.fitness else None,
         "judged": result.fitness[name].sentence if name in result.fitness else "",
         "material": material_name(result) + (", outside its regions" if result.problem.regions else ""),
-        "rows": _moduli_rows(moduli),
+        "rows": moduli_rows(moduli),
         "elements": linear_fem(path).removeprefix("linear "),
         "bending": [
             (
@@ -272,7 +272,7 @@ def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
     }
 
 
-def _moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
+def moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
     """Return name, effective value of the springs and value of the material of each modulus."""
     plane = moduli.dim == 2
     youngs = [("along x", moduli.young()), *([("at 45°", moduli.young(45))] if plane else [])]

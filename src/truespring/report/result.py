@@ -11,6 +11,7 @@ from truespring.equilibrium import FINE, Solution
 from truespring.models import Fitness
 from truespring.problem import Problem
 from truespring.refining import Standing
+from truespring.report.series import Form
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ class Result:
         splits: errors of the time step and of the solver in a motion of the model; None at rest, or if not known.
         in_detail: whether distances of surfaces [m] and energies are reported too, and plane bodies coloured by
             distance, as in comparisons of two results.
+        form: form of the files of the levels.
     """
 
     title: str
@@ -85,9 +87,16 @@ class Result:
     standings: Mapping[str, Standing] = field(default_factory=dict)
     splits: MotionErrors | None = None
     in_detail: bool = False
+    form: Form = "vtu"
 
     def __repr__(self) -> str:
         return f"Result({self.stem}, {list(self.paths.values())})"
+
+    def _repr_html_(self) -> str:
+        """Return the result as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
 
     @property
     def stem(self) -> str:

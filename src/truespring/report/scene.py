@@ -21,6 +21,8 @@ from truespring.report.undeformed import spring_lines
 
 # With more springs than this, only those on the surface are drawn; with more nodes, a body that is cut is hollow.
 _MOST_SPRINGS, _MOST_SOLID = 20_000, 3_000
+# Steps of the range of a quantity, and with more values than the last number.
+_FINE, _COARSE, _MANY = 65535, 255, 100_000
 
 
 def scene_nodes(result: Result, shown: Sequence[str]) -> Ints:
@@ -85,6 +87,7 @@ def fields_in_scene(
         for path in map(result.paths.__getitem__, shown)
     ]
     fields, values = [], [dict[str, list[str]]() for _ in shown]
+    steps = _FINE if len(FIELDS) * len(shown) * len(levels) * len(pack.nodes) <= _MANY else _COARSE
     for name, field in FIELDS.items():
         those = [
             (place, [one[name] for one in several]) for place, several in enumerate(known) if _all_have(several, name)
@@ -96,9 +99,9 @@ def fields_in_scene(
             continue
         scale = natural_scale(high, field.unit)
         ends = {"low": low / scale.size, "high": high / scale.size}
-        fields.append({"name": name, "label": field.label, "unit": scale.unit, **ends})
+        fields.append({"name": name, "label": field.label, "unit": scale.unit, "steps": steps, **ends})
         for place, several in those:
-            values[place][name] = [pack.shares(one, low, high) for one in several]
+            values[place][name] = [pack.shares(one, low, high, steps) for one in several]
     return fields, values
 
 

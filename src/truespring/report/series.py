@@ -1,10 +1,11 @@
 """Deformed bodies as files: a VTU series for ParaView and an STL of the last state."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -20,6 +21,9 @@ from truespring.mesh.files.vtkhdf_writing import Step, write_vtkhdf
 from truespring.mesh.files.vtu_writing import write_vtu
 from truespring.potential import Visible
 from truespring.report.surfaces import facets_of
+
+#: Name of a form of the files of all levels.
+Form = Literal["vtu", "vtkhdf"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +110,26 @@ def _timed(path: Solution) -> list[tuple[float, State | None]]:
     if any(one >= other for one, other in pairwise(factors)):
         times = [*range(len(factors))]
     return list(zip(times, path.states, strict=True))
+
+
+def _write_one_file(path: Solution, folder: Path, name: str) -> None:
+    write_vtkhdf_series(path, folder / f"{name}{SERIES['vtkhdf'].suffix}")
+
+
+class Series(NamedTuple):
+    """A form of the files of all levels: the suffix of the file to open, and a function that writes them.
+
+    The function takes the solution, the folder, and the name of the file without its suffix.
+    """
+
+    suffix: str
+    write: Callable[[Solution, Path, str], None]
+
+
+#: Forms of the files of all levels.
+SERIES: Mapping[Form, Series] = MappingProxyType(
+    {"vtu": Series(".pvd", write_series), "vtkhdf": Series(".vtkhdf", _write_one_file)}
+)
 
 
 def write_mesh(mesh: Mesh, file: Path, held: Bools | None = None) -> None:

@@ -8,6 +8,7 @@
   // x, y[, z], x, y[, z], ... in 0 ... 65535 of the box, or beyond it
   const places = (text, beyond) => new (beyond ? Float32Array : Uint16Array)(bytes(text));
   const pairs = (text) => new Uint32Array(bytes(text || "")); // from, to, from, to, ...
+  const steps = (text, most) => new (most < 256 ? Uint8Array : Uint16Array)(bytes(text));
   const few = (text, n_nodes) => new (n_nodes < 65536 ? Uint16Array : Uint32Array)(bytes(text || ""));
 
   for (const host of document.querySelectorAll("[data-viewer]")) {
@@ -22,7 +23,7 @@
       lines: pairs(path.lines),
       inside: pairs(path.inside),
       positions: path.positions.map((text) => places(text, path.beyond)),
-      fields: Object.fromEntries(Object.entries(path.fields || {}).map(([name, texts]) => [name, texts.map((text) => places(text, false))])),
+      fields: Object.fromEntries(Object.entries(path.fields || {}).map(([name, texts]) => [name, texts.map((text) => steps(text, data.fields.find((field) => field.name === name).steps))])),
       surface: path.surface && {
         ...path.surface, points: places(path.surface.points, path.beyond), lines: pairs(path.surface.lines),
       },

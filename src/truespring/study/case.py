@@ -13,6 +13,7 @@ from truespring.mesh import Mesh, named_point, nearest_node
 from truespring.models import Model, as_model, check_fibres
 from truespring.potential import Potential
 from truespring.problem import Problem
+from truespring.report.series import Form
 from truespring.solvers import Newton, Solver, as_solver
 
 
@@ -29,6 +30,7 @@ class Case:
         probe: number of the probe's node; None for the node that moves most.
         tolerance: largest error, rms or of force, at which two results agree.
         refine: whether each reference is also solved on a finer mesh to estimate its discretisation error.
+        form: form of the files of the levels.
     """
 
     title: str
@@ -40,6 +42,7 @@ class Case:
     probe: int | None
     tolerance: float
     refine: bool = True
+    form: Form = "vtu"
 
     @property
     def file(self) -> Path:

@@ -152,6 +152,7 @@ def _build(text: StudyText, keys: StudyKeys, halvings: int, balanced: bool) -> S
         probe=keys.compare.node(places, problem.mesh),
         tolerance=keys.compare.tolerance,
         refine=keys.compare.refine,
+        form=keys.output.build(places),
     )
 
 

@@ -75,6 +75,7 @@ def run(
         else {},
         standings=standings(case, paths, names, timeout) if refining else {},
         splits=motion_errors(case, model, probe, timeout) if comparing and refining else None,
+        form=case.form,
     )
 
 

@@ -10,8 +10,10 @@ from truespring.reactions import moved_supports
 from truespring.report.command import command_line
 from truespring.report.curves import write_curves, write_reactions
 from truespring.report.histories import write_histories
+from truespring.report.paraview import NAME as PARAVIEW
+from truespring.report.paraview import paraview_script
 from truespring.report.result import Result
-from truespring.report.series import write_mesh, write_series, write_stl
+from truespring.report.series import SERIES, Form, write_mesh, write_stl
 from truespring.report.summary import summary
 from truespring.study.case import Case
 
@@ -28,13 +30,13 @@ def write(result: Result, out: Path, report: bool = True, animate: bool = False)
     """
     with output(result, out) as own:
         for name, path in result.paths.items():
-            write_model(path, own, name)
+            write_model(path, own, name, result.form)
         write_rest(result, own, verify_command([result], out, animate), report, animate)
 
 
-def write_model(path: Solution, output: Output, name: str) -> None:
-    """Write the VTU series and the STL file of one model."""
-    write_series(path, output.staging, name)
+def write_model(path: Solution, output: Output, name: str, form: Form = "vtu") -> None:
+    """Write the levels of one model in a form, and its STL file."""
+    SERIES[form].write(path, output.staging, name)
     write_stl(path, output.staging / f"deformed_{name}.stl")
 
 
@@ -49,6 +51,7 @@ def write_rest(result: Result, output: Output, command: str | None, report: bool
     write_histories(result, folder)
     if moved_supports(result.problem):
         write_reactions(result, folder / "reactions.csv")
+    _write_script(result, folder)
     if result.problem.mesh.element != "line":
         write_mesh(result.problem.mesh, folder / "mesh.vtu", result.problem.loading.held)
     note = ""
@@ -67,6 +70,16 @@ def write_rest(result: Result, output: Output, command: str | None, report: bool
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     output.publish()
     return note
+
+
+def _write_script(result: Result, folder: Path) -> None:
+    """Write the script that opens the models with states in ParaView, deformed; nothing without any."""
+    names = {name: f"{name}{SERIES[result.form].suffix}" for name, path in result.paths.items() if path.states}
+    if names:
+        shown = result.model if result.model in names else next(iter(names))
+        flat = result.problem.mesh.dim == 2
+        script = paraview_script(names, str(shown), "displacement", flat)
+        (folder / PARAVIEW).write_text(script, encoding="utf-8")
 
 
 def write_overview(results: Sequence[Result], out: Path, animate: bool = False) -> None:

@@ -1,6 +1,7 @@
 """Keys of a whole study file, of `[solver]` and of `[compare]`."""
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
@@ -11,6 +12,7 @@ from truespring.errors import StudyError, nearest
 from truespring.mesh import Mesh, named_point, nearest_node, select
 from truespring.models import Model
 from truespring.problem import Problem
+from truespring.report.series import Form
 from truespring.solvers import ArcLength, DisplacementControl, Newton, Solver
 from truespring.study.case import compared_model
 from truespring.study.places import Places
@@ -205,6 +207,23 @@ class CompareKeys(Keys):
                 raise StudyError(f"'{name}' is not among the models{nearest(name, models)}: {', '.join(models)}")
 
 
+class OutputKeys(Keys):
+    """Which files are written."""
+
+    form: Form = Field(
+        default="vtu",
+        description="files of the levels: vtu, a .pvd and a .vtu for each level; or vtkhdf, one HDF5 file, for large "
+        "bodies",
+    )
+
+    def build(self, places: Places) -> Form:
+        """Return the form; raise StudyError if the library that writes it is not installed."""
+        if self.form == "vtkhdf" and find_spec("h5py") is None:
+            with places.at("output", "form"):
+                raise StudyError('"vtkhdf" needs h5py: pip install \'truespring[vtkhdf]\', or use "vtu"')
+        return self.form
+
+
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
 
 
@@ -232,6 +251,7 @@ class StudyKeys(Keys):
         description="models to solve, by names of your choice"
     )
     compare: CompareKeys = Field(default=CompareKeys(), description="which models are compared, and where")
+    output: OutputKeys = Field(default=OutputKeys(), description="which files are written")
 
     @field_validator("models")
     @classmethod
