@@ -23,6 +23,7 @@ verification: .venv/test $(if $(wildcard $(PETSC_DIR)/include/petscversion.h),.v
 	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
+	$(BIN)/python docs/build_theory.py
 
 # Measures Table 1 of the paper and rebuilds docs/table1.md. It measures times: run nothing else meanwhile.
 table1: .venv/test

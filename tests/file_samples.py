@@ -53,6 +53,11 @@ def _series(folder: Path, suffix: str) -> Path:
     return folder / "sample.pvd"
 
 
+def _vtkhdf(folder: Path, suffix: str) -> Path:
+    bar().save(folder / "sample.vtkhdf")
+    return folder / "sample.vtkhdf"
+
+
 def _calculix(folder: Path, suffix: str) -> Path:
     """Run by CalculiX, or skipped without it."""
     if shutil.which("ccx") is None:
@@ -96,6 +101,7 @@ _MESHES: dict[str, Sample] = {
 _RESULTS: dict[str, Sample] = {
     **_VTK,
     ".pvd": _series,
+    ".vtkhdf": _vtkhdf,
     ".frd": _calculix,
     ".dat": _calculix,
     ".rst": _ansys,

@@ -12,6 +12,7 @@ from truespring.calibration import Curve, LoadCase, Objective, identifiability, 
 from truespring.calibration.fitted import CaseResult
 from truespring.calibration.full_field import equations, fit_full_field
 from truespring.calibration.objective import relative_errors
+from truespring.calibration.shapes import shape_figure
 from truespring.errors import ModelError, ProblemError, ReferenceFileError
 from truespring.problem import Problem
 from truespring.reference import Level, Placing, Record, placed
@@ -192,6 +193,7 @@ def test_hourglass_at_the_limit_of_stability_is_a_warning(known: float, warned: 
     problem = Problem(box, ts.Material(10e3, 0.3), supports=[ts.Fixed("left")], loads=[load])
     case = case_of(problem, ts.Springs("gaussian", hourglass=known), 1)
     found = ts.calibrate(case, ts.Springs("gaussian"), regularisation=0.0)
+    assert found.headline in found._repr_html_() and "data:image/png;base64," in found._repr_html_()
     assert found.model.hourglass == pytest.approx(known, abs=1e-3)  # type: ignore[attr-defined]
     assert any("limit of stability, 0.5" in one for one in found.warnings) == warned
 
@@ -396,6 +398,7 @@ def test_a_curve_tells_how_far_the_load_went_by_itself(tmp_path: Path) -> None:
             read_curve(file, problem, 7)
 
 
+@pytest.mark.verification
 def test_springs_that_turn_inside_out_are_none_unless_the_rule_does_so_too() -> None:
     problem = cantilever(loads=(), displacement=(0.0, 0.2))
     case = case_of(problem, ts.Fem("neo-hookean"), 2)
@@ -543,6 +546,18 @@ def test_what_does_not_fit_is_refused() -> None:
         apart = case_of(other, ts.Springs("isotropic"), 1, "other")
         with pytest.raises(ProblemError, match=f"other: its {what} "):
             ts.calibrate(case, ts.Springs("lloyd"), held_out=apart)
+
+
+def test_a_shape_has_the_body_before_after_and_the_reference() -> None:
+    problem = cantilever((4, 1))
+    case = case_of(problem, ts.Fem("neo-hookean"), 2)
+    before, after = (ts.solve(problem, ts.Springs(rule), case.solver) for rule in ("lloyd", "gaussian"))
+    sheet = shape_figure(CaseResult(case, False, before, after))
+    assert sheet is not None and case.reference is not None
+    drawn = {artist.get_gid(): artist.get_path().vertices for artist in sheet.artists if artist.get_gid()}
+    edges = problem.mesh.edges
+    for name, path in (("by_the_rule", before), ("calibrated", after), ("neo-Hookean_FEM", case.reference)):
+        assert drawn[name] == pytest.approx(path.states[-1].positions[edges].reshape(-1, 2))
 
 
 def test_the_result_is_a_table_figures_and_files(tmp_path: Path) -> None:

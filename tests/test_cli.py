@@ -43,7 +43,7 @@ def rows(file: Path) -> list[dict[str, str]]:
 
 def test_verify_writes_every_file_of_the_contract(out: Path) -> None:
     assert {path.name for path in out.iterdir()} == {"study", "report.html"}
-    expected = {"curves.csv", "summary.json", "mesh.vtu", "figures", "report.html"}
+    expected = {"curves.csv", "summary.json", "mesh.vtu", "open_in_paraview.py", "figures", "report.html"}
     for model in MODELS:
         expected |= {f"{model}.pvd", model, f"deformed_{model}.stl"}
     # A hidden list of them all is for the next run.

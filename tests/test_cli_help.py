@@ -176,7 +176,7 @@ def test_new_studies_are_right_and_overwrite_nothing(
         assert plan["mesh_notes"] == []
     monkeypatch.chdir(tmp_path)
     assert main(["new", "mesh", "liver.toml"]) == 0
-    assert {one.name for one in tmp_path.iterdir()} == {"liver.toml", "liver.msh"}
+    assert {one.name for one in tmp_path.iterdir()} == {"liver.toml", "liver.msh", "liver.geo"}
     assert 'file = "liver.msh"' in (tmp_path / "liver.toml").read_text("utf-8")
     for wrong in (["mesh", "liver.toml"], ["mesh", "liver.msh"], ["strip", "none/strip.toml"], ["strp"]):
         assert main(["new", *wrong]) == 2

@@ -220,6 +220,7 @@ def test_stl_in_stl_out(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     assert surfaces["rms_error"] is None and surfaces["hausdorff"] > 0.9 * alone["hausdorff"]
 
 
+@pytest.mark.verification
 def test_surfaces_of_solids(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     study = tmp_path / "block.toml"
     study.write_text(

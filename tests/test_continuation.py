@@ -110,7 +110,7 @@ def test_star_dome_by_arc_length_meets_the_same_limit() -> None:
 # --- columns that buckle ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("depth", [2, 4])
+@pytest.mark.parametrize("depth", [2, pytest.param(4, marks=pytest.mark.verification)])
 def test_a_column_buckles_at_the_load_of_euler(depth: int) -> None:
     """pi^2 EI(n) / (4 L^2), EI(n) that of Lloyd's springs at this depth, slender enough that little else counts."""
     slender = 40

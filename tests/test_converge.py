@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.lines import Line2D
 
 import truespring as ts
 from tests.studies import changed, written
@@ -16,6 +17,7 @@ from truespring.calibration.study import calibrate_study
 from truespring.cli import main
 from truespring.converging import converge
 from truespring.converging.converge import _watched
+from truespring.converging.figures import settling_figures
 from truespring.converging.settling import Attempt, refinement, settle
 from truespring.errors import TruespringError
 from truespring.mesh import refined
@@ -271,10 +273,22 @@ def test_a_model_whose_quantities_are_all_zero_is_told() -> None:
     assert not found.settled and "all watched quantities of b are zero" in found.sentence
 
 
+def test_the_figure_of_a_quantity_has_its_limit_at_size_zero() -> None:
+    """Values 1 + h^2 for h = 1, 1/2, 1/4, whose limit is 1."""
+    attempts = [Attempt("a", 10 * 4**mesh, "converged", 1.0, "", True) for mesh in range(3)]
+    values = {("a", "energy", "J"): [(10 * 4**mesh, 1.0 + 0.25**mesh) for mesh in range(3)]}
+    sheet = dict(settling_figures(refinement(attempts, values, 0.5)))["converge_energy"]
+    (line,) = [one for one in sheet.artists if isinstance(one, Line2D) and one.get_label() == "a"]
+    assert line.get_xdata() == pytest.approx([0, 0.25, 0.5, 1.0])
+    assert line.get_ydata() == pytest.approx([1.0, 1.0625, 1.25, 2.0])
+
+
 def test_the_result_is_a_table_figures_and_files(tmp_path: Path) -> None:
     *_, found = ts.converge(written(tmp_path), most=2)
     assert found.table().height == len(found.rows) == sum(len(one.values) for one in found.quantities) > 4
-    assert [sheet.svg()[:5] for sheet in found.figures().values()] == [b"<?xml"]
+    figures = found.figures()
+    assert {"converge", "converge_energy", "converge_ux_of_the_probe"} <= figures.keys()
+    assert {sheet.svg()[:5] for sheet in figures.values()} == {b"<?xml"}
     files = found.write(tmp_path / "out")
     assert all(file.is_file() and file.parent == tmp_path / "out" / "study" for file in files.values())
 

@@ -72,7 +72,13 @@ def settled(drive: ModuleType, folder: Path, times: float = 2.0) -> tuple[float,
     return drive.distance(model, data, springs.body), springs.energy(data)
 
 
-@pytest.mark.parametrize("name", _BODIES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in ("gaussian", "ten nodes", "volume term") else pytest.param(name, marks=pytest.mark.verification)
+        for name in _BODIES
+    ],
+)
 def test_the_driver_settles_on_our_equilibrium(name: str, drive: Any) -> None:
     one = body(name)
     assert one.state is not None
@@ -103,16 +109,14 @@ def test_shipped_bodies_settle_on_our_equilibrium(example: str, model: str, driv
 
 
 @pytest.mark.verification
-def test_the_organ_keeps_its_equilibrium(drive: Any) -> None:
-    """Of nearly ten thousand voxels, moved by its supports; to settle from the start takes MuJoCo minutes."""
-    module, folder = drive(shipped("organ", "gaussian"))
-    model = mujoco.MjModel.from_xml_path(str(folder / "springs.xml"))
-    springs, data = module.install(model), mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
-    mujoco.mj_step(model, data, 20)
-    mujoco.mj_forward(model, data)
-    assert not any(warning.number for warning in data.warning)
-    assert module.distance(model, data, springs.body) < 1e-4
+def test_the_organ_settles_from_the_start(drive: Any) -> None:
+    """Nearly ten thousand voxels, from the undeformed body but for its supports; this takes minutes."""
+    one = shipped("organ", "gaussian")
+    module, folder = drive(one)
+    assert settled(module, folder, 0.0)[0] > 0.3
+    distance, energy = settled(module, folder, 1.6)
+    assert one.state is not None
+    assert distance < 1e-4 and energy == pytest.approx(one.state.energy, rel=1e-4)
 
 
 @pytest.mark.parametrize(

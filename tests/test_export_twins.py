@@ -254,3 +254,25 @@ def test_shipped_bodies_in_calculix(study: str, tmp_path: Path) -> None:
     away = np.linalg.norm(found[: len(ours)] - ours, axis=1).max() / np.linalg.norm(ours, axis=1).max()
     assert away < values["largest_difference"] + 0.01
     assert read_dat(tmp_path / "twin.dat").levels
+
+
+@needs_ccx
+@pytest.mark.verification
+@pytest.mark.parametrize(("share", "rms", "probe"), [(0.01, 1e-3, 1e-4), (1.0, 0.015, 5e-3)])
+def test_the_organ_in_calculix(share: float, rms: float, probe: float, tmp_path: Path) -> None:
+    """At full load the law differs, and the mean strain of its elements; the header states where its probe is."""
+    from tests.test_examples import EXAMPLES
+    from truespring.study import export_study, read_study
+
+    changes = {
+        "solver.load_steps": 1,
+        "support.2.displacement": [0.003 * share, -0.006 * share, 0.0],
+        "load.1.gravity": [0.0, -9.81 * share, 0.0],
+    }
+    (written,) = export_study(read_study(EXAMPLES / "organ.toml", **changes), ["calculix"], tmp_path)
+    deck = next(file for file in written.files if file.name == "twin.inp")
+    found = displacements(deck.read_text(), tmp_path)[-1]
+    assert distance(written.exported, found) < rms
+    values = json.loads((deck.parent / "exported.json").read_text())["twin"]
+    away = np.linalg.norm(found[written.exported.probe] - values["probe_displacement"])
+    assert away < probe * np.linalg.norm(found, axis=1).max()

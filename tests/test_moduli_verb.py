@@ -477,6 +477,7 @@ def test_moduli_of_a_study_without_springs(tmp_path: Path, capsys: pytest.Captur
     assert main(["moduli", str(tmp_path / "none.toml"), "--out", str(tmp_path / "out")]) == 2
 
 
+@pytest.mark.verification
 def test_check_says_it_too_and_knows_bodies_in_space(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = written(tmp_path, BOX)
     assert main(["check", str(file), "--out", str(tmp_path)]) == 0

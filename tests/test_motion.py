@@ -55,6 +55,7 @@ def test_the_energy_of_an_oscillator_decays_as_the_scheme_says() -> None:
     assert kept == pytest.approx(np.full(n + 1, 1e-4), rel=1e-10)
 
 
+@cache
 def chain(step: float, scheme: str) -> np.ndarray:
     """Three masses on springs in the plane, let go from rest under their weight: positions at the end."""
     nodes = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
@@ -120,6 +121,7 @@ def momenta(path: ts.Solution) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("damping", [0.0, pytest.param(2e-3, marks=LONG)])
 @pytest.mark.parametrize("model", [pytest.param(one, marks=[] if one == "gaussian" else LONG) for one in MODELS])
+@pytest.mark.verification
 def test_a_free_body_keeps_its_momenta(model: str, damping: float) -> None:
     """A body that was spun by a moment and pulled for a while flies on freely; damping by the material keeps both."""
     pulled = [

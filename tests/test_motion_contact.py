@@ -59,7 +59,12 @@ def speed(state: ts.State) -> float:
 
 @pytest.mark.parametrize(
     ("angle", "friction", "length"),
-    [(30, 0.4, 1e-3), pytest.param(30, 0.4, 1.0, marks=LONG), (30, 0.0, 1.0), pytest.param(30, 0.0, 1e-3, marks=LONG)],
+    [
+        pytest.param(30, 0.4, 1e-3, marks=LONG),
+        pytest.param(30, 0.4, 1.0, marks=LONG),
+        (30, 0.0, 1.0),
+        pytest.param(30, 0.0, 1e-3, marks=LONG),
+    ],
 )
 def test_a_block_slides_down_an_incline(angle: float, friction: float, length: float) -> None:
     """The acceleration is g (sin - mu cos), on all scales."""
@@ -82,6 +87,7 @@ def test_a_block_slides_on_a_barrier() -> None:
     assert found == pytest.approx(G * (np.sin(slope) - 0.4 * np.cos(slope)), rel=5e-3)
 
 
+@pytest.mark.verification
 def test_leapfrog_slides_and_sticks_without_regularisation() -> None:
     """It knows what friction dissipates: that closes the sum of energies."""
     slope = np.radians(30)

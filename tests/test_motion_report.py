@@ -161,7 +161,7 @@ def test_a_sweep_shows_the_largest_displacement_of_a_motion() -> None:
     values = summary(result(0.1)) | {"comparison": {}}
     (row,) = rows_of(["k"], [{"values": {"k": 1}, "status": "converged", "reason": "", "summary": values}])
     assert row["models.springs.largest_probe_displacement"] == pytest.approx(1.1 * 5 * 0.08**2)
-    assert measured([row]).values["springs"] == [pytest.approx(1.1 * 5 * 0.08**2 * 1e3)]  # [mm]
+    assert next(measured([row])).values["springs"] == [pytest.approx(1.1 * 5 * 0.08**2 * 1e3)]  # [mm]
 
 
 def test_an_exception_ends_a_motion_at_a_time() -> None:

@@ -224,7 +224,7 @@ def test_ccx_whose_time_is_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_a_study_keeps_what_was_read(tmp_path: Path) -> None:
     """With changes, finer, and without its file: nobody reads it again."""
     file = written(tmp_path)
-    study = read_study(file, changes={"mesh.elements": [4, 1], "mesh.size": ["20 mm", "5 mm"], "material.young": 7.0})
+    study = read_study(file, **{"mesh.elements": [4, 1], "mesh.size": ["20 mm", "5 mm"], "material.young": 7.0})
     file.unlink()
     assert study.keys.mesh.elements == [4, 1] and study.keys.material.young == 7.0
     assert Body.of(study).shape.size == [0.02, 0.005] == Body.of(study).problem.mesh.upper.tolist()
@@ -239,7 +239,7 @@ def test_a_changed_study_is_calibrated_as_it_was_changed(tmp_path: Path) -> None
     from truespring.calibration.writing import calibrated_study, write_calibrated
 
     changes = {"mesh.elements": [4, 1], "mesh.size": ["20 mm", "5 mm"], "load.1.force": [0.0, -1e-4]}
-    found = calibrate_study(read_study(written(tmp_path), changes=changes))
+    found = calibrate_study(read_study(written(tmp_path), **changes))
     study, *_ = write_calibrated(found, tmp_path / "out", "")
     again = read_study(study)
     assert again.problem.mesh.n_nodes == 10

@@ -32,6 +32,8 @@ from truespring.report.result import Result
 from truespring.report.sheet import Area, Sheet
 from truespring.report.style import figure_style
 from truespring.report.summary import summary
+from truespring.report.support_curves import support_figures
+from truespring.report.symbols import find_arrows
 from truespring.report.undeformed import undeformed_of
 from truespring.report.verdict import (
     carrying_sentence,
@@ -875,6 +877,57 @@ def test_reactions_of_moved_supports_are_written_and_drawn(tmp_path: FilePath) -
         if row["model"] == "a":  # linear elements balance on the body at rest
             assert float(row["mz"]) + own == pytest.approx(-others, rel=1e-6)
     assert "reactions" in draw_figures(told)
+
+
+@pytest.mark.parametrize("pressure", [300.0, -100.0])
+def test_pressure_has_arrows_along_its_side(pressure: float) -> None:
+    problem = replace(stretched(), loads=(ts.Pressure("top", pressure),))
+    arrows = find_arrows(problem, 0.08)
+    tails, tips = (np.array(ends) for ends in zip(*(arrow.ends for arrow in arrows), strict=True))
+    assert tips - tails == pytest.approx(np.tile([0.0, -0.08 * 0.08 * np.sign(pressure)], (4, 1)))
+    at_side = tips if pressure > 0 else tails
+    assert at_side == pytest.approx(np.column_stack([0.01 + 0.02 * np.arange(4), np.full(4, 0.02)]))
+    assert [arrow.text for arrow in arrows] == ["", "", "", f"p = {pressure:g} Pa".replace("-", "\N{MINUS SIGN}")]
+
+
+def test_pressure_in_space_has_arrows_where_its_side_is_seen() -> None:
+    block = ts.Problem(
+        ts.box((0.04, 0.04, 0.04), (2, 2, 2)),
+        ts.Material(1e4, 0.3),
+        None,
+        [ts.Fixed("left")],
+        [ts.Pressure("top", 1.0)],
+    )
+    towards = np.array([0.55, 0.5, 1.0])
+
+    def arrows(side: str) -> int:
+        return len(find_arrows(replace(block, loads=(ts.Pressure(side, 1.0),)), 0.04, lambda at: at[:, :2], towards))
+
+    assert (arrows("top"), arrows("right"), arrows("bottom")) == (4, 4, 1)
+
+
+def test_every_moved_support_has_curves_of_its_force_and_torque() -> None:
+    """A block twisted at one end and pressed at the other: the curves end at the resultants of reactions."""
+    problem = ts.Problem(
+        ts.rectangle((0.16, 0.04), (8, 2)),
+        ts.Material(1e4, 0.3),
+        ts.PlaneStress(0.01),
+        [ts.Fixed("left", displacement=(0.004, 0.0)), ts.Fixed("right", rotation=0.2)],
+        [],
+    )
+    path = ts.solve(problem, ts.Springs("isotropic"), ts.Newton(load_steps=2))
+    figures = dict(support_figures(result(path, {})))
+    titles = [sheet.title for sheet in figures.values()]
+    assert list(figures)[:2] == ["reactions", "reactions_2"]
+    assert {"Torque of support 2, right", "Force of support 1, left"} <= set(titles)
+    right, state = problem.held[1].nodes, path.states[-1]
+    arms = state.positions[right] - state.positions[right].mean(axis=0)
+    torque = (arms[:, 0] * state.reaction[right, 1] - arms[:, 1] * state.reaction[right, 0]).sum()
+    sheet = next(sheet for sheet in figures.values() if sheet.title == "Torque of support 2, right")
+    line = next(one for one in sheet.artists if isinstance(one, Line2D) and len(one.get_xdata()) == 3)
+    assert "torque of the support [mN m]" in words(sheet)
+    assert line.get_xdata()[-1] == pytest.approx(1e3 * torque)
+    assert line.get_ydata() == pytest.approx(np.degrees([0.0, 0.1, 0.2]))
 
 
 def test_loads_without_a_total_are_drawn_by_their_factor() -> None:

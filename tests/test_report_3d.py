@@ -225,6 +225,7 @@ def test_a_job_is_read_as_it_was_written(tmp_path: FilePath) -> None:
 
 
 @pytest.mark.skipif(importlib.util.find_spec("pyvista") is None, reason="PyVista is not installed")
+@pytest.mark.verification
 def test_pyvista_and_matplotlib_draw_the_same() -> None:
     found = result(body("tetrahedron", (8, 2, 4)))
     comparison = found.comparisons["linear"]
@@ -469,6 +470,7 @@ def test_every_model_of_springs_is_drawn_by_its_springs(model: ts.Springs) -> No
 
 def test_nodes_inside_that_nothing_is_drawn_at_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("truespring.report.scene._MOST_SPRINGS", 100)
+    monkeypatch.setattr("truespring.report.scene._MOST_SOLID", 100)
     problem = body(elements=(6, 3, 3))
     found = result(problem)
     data = viewer(found, 400_000)
@@ -561,7 +563,7 @@ def test_the_page_speaks_of_a_body_in_3d(page_of: Callable[..., Page]) -> None:
     assert in_order(words, "mesh: 2 nodes that no element uses were left out")
     assert "note: mesh: 2 nodes that no element uses were left out" in list(result_tables(found))
     assert words.count("Drawn by hand.") == 1
-    assert "coloured by its distance" in words and "colour by distance" in words and "WebGL" in words
+    assert "coloured by its distance" in words and "distance from the reference" in words and "WebGL" in words
 
 
 def test_a_push_along_z_is_told_as_such(page_of: Callable[..., Page], by_matplotlib: None) -> None:

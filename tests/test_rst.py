@@ -72,6 +72,7 @@ def test_cells_that_lack_a_middle_become_their_corners() -> None:
         sized(types[:1], np.array([0, 9]), connectivity, is_made, Path("file.rst"))
 
 
+@pytest.mark.verification
 def test_a_file_of_ansys_before_14_is_read(sample: Path, record: Record, tmp_path: Path) -> None:
     """Its header has 40 words, not 80; behind it the record that follows begins with its own length, flag and numbers.
 

@@ -41,6 +41,7 @@ from truespring.kernels.threads import n_threads
 from truespring.report.rows import table_of
 from truespring.study import read_study, read_text, run, value_at
 from truespring.sweeping import Failure, Pool, here, plan_sweep, run_sweep
+from truespring.sweeping.figures import measured
 from truespring.sweeping.here import run_here
 from truespring.sweeping.store import FAILED, Store
 from truespring.sweeping.sweep import _outcome, solve_point
@@ -150,7 +151,7 @@ def test_points_come_from_a_table(study: Path) -> None:
 )
 def test_any_key_can_have_another_value(tmp_path: Path, key: str, value: Any, read: Any) -> None:
     file = written(tmp_path, STUDY.replace('rule = "lloyd"', 'rule = "isotropic"'))
-    assert not read(read_study(file)) and read(read_study(file, changes={key: value}))
+    assert not read(read_study(file)) and read(read_study(file, **{key: value}))
     assert value_at(read_text(file).keys({key: value}), "load.1.on") == "right"
 
 
@@ -491,7 +492,7 @@ def test_a_failed_point_is_recorded_and_the_rest_goes_on(swept: tuple[Path, dict
 def test_the_table_has_the_figures_of_the_summary(swept: tuple[Path, dict[str, Any], str]) -> None:
     folder, told, _ = swept
     (row,) = [one for one in told["rows"] if (one["mesh.elements"], one["material.poisson"]) == ([8, 2], 0.2)]
-    result = run(read_study(folder / "study.toml", changes={"material.poisson": 0.2}))
+    result = run(read_study(folder / "study.toml", **{"material.poisson": 0.2}))
     springs, one = result.paths["springs"], result.comparisons["linear"]
     last = springs.states[-1]
     assert row["comparison.linear.rms_error"] == pytest.approx(one.rms_error, rel=1e-9)
@@ -513,6 +514,22 @@ def test_the_table_has_the_figures_of_the_summary(swept: tuple[Path, dict[str, A
     assert table.columns == list(row)
     for column in ("material.poisson", "models.springs.load_factor", "comparison.linear.max_error"):
         assert table[column].to_list() == [one[column] for one in told["rows"]]
+
+
+def test_displacement_and_force_are_drawn_where_they_vary() -> None:
+    def row(young: float, moved: float, force: float) -> dict[str, Any]:
+        at_probe = {"models.a.probe_displacement.x": 3 * moved, "models.a.probe_displacement.y": 4 * moved}
+        forces = {"models.a.force.x": 0.0, "models.a.force.y": force}
+        return {"material.young": young, "status": "converged", **at_probe, **forces, "comparison.b.rms_error": 0.1}
+
+    loaded = list(measured([row(1e3, 2e-3, -5.0), row(2e3, 1e-3, -5.0)]))
+    assert [(one.title, one.label) for one in loaded] == [
+        ("Displacement of the probe", "displacement [mm]"),
+        ("Rms error", "rms error [%]"),
+    ]
+    assert loaded[0].values == {"a": [pytest.approx(10.0), pytest.approx(5.0)]}
+    moved = list(measured([row(1e3, 2e-3, 5.0), row(2e3, 2e-3, 10.0)]))
+    assert [one.title for one in moved] == ["Force", "Rms error"] and moved[0].values == {"a": [5.0, 10.0]}
 
 
 def test_the_page_loads_nothing(swept: tuple[Path, dict[str, Any], str]) -> None:
@@ -572,7 +589,7 @@ def test_any_cluster_will_do(cluster: str, study: Path) -> None:
     theirs = ts.sweep(study, vary, scheduler=cluster).table()
     # Here, without any cluster.
     for row in theirs.iter_rows(named=True):
-        here = run(read_study(study, changes={"material.poisson": row["material.poisson"]}))
+        here = run(read_study(study, **{"material.poisson": row["material.poisson"]}))
         assert row["comparison.linear.rms_error"] == pytest.approx(here.comparisons["linear"].rms_error, rel=1e-9)
     assert theirs["material.poisson"].to_list() == [0.0, 0.1, 0.2, 0.3, 0.4]
 

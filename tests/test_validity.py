@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from html import escape
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -65,6 +66,7 @@ def _lattice(strain: float, rule: str) -> tuple[float, float]:
 def test_tension_is_the_closed_form_of_lattice_and_law(study: Path, law: str) -> None:
     """Both moved between smooth plates: uniform stress; they differ in the force and in the stretch across."""
     found = map_validity(study, law=law, loads=["stretch"], rules=list(LATTICES), y=None)
+    assert escape(found.verdicts[0]) in found._repr_html_() and "data:image/png;base64," in found._repr_html_()
     nodes = found.body.problem.mesh.nodes
     # Two corners are held along by the plates and across by the plane below: they tell nothing of a model.
     corners = np.isin(nodes[:, 0], [nodes[:, 0].min(), nodes[:, 0].max()]) & (nodes[:, 1] == nodes[:, 1].min())
@@ -100,6 +102,7 @@ def test_lloyd_is_soft_at_small_strain_and_meets_linear_fem_at_30_percent(
     assert 1 + deviation.stiffness_on_grid[at] == pytest.approx(0.29976 / 0.3, abs=1e-4)
 
 
+@pytest.mark.verification
 def test_bending_is_best_at_three_elements_for_lloyd_and_falls_for_isotropic(bent: Validity) -> None:
     lloyd, isotropic = bent.maps
     assert lloyd.y[int(lloyd.errors[:, 0].argmin())] == 3
@@ -419,6 +422,7 @@ def test_a_range_counts_values(study: Path) -> None:
         read_range("poisson=0:0.4:1")
 
 
+@pytest.mark.verification
 def test_a_valley_between_two_rows_is_not_filled(study: Path) -> None:
     """Where springs cross the reference at another strain for each Poisson's ratio, they do so between two as well."""
     (one,) = map_validity(

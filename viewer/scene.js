@@ -23,11 +23,14 @@
  * OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN
  * THE SOFTWARE.
  */
-import { BufferAttribute, BufferGeometry, Mesh } from "three";
+import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, Plane } from "three";
 import {
-  BLUE, GREEN, GREY, INK, PALE, RED, Strokes, colouredMaterial, createView, hiding, legend, lit, outliner, places,
+  BLUE, GREEN, GREY, INK, PALE, RED, Strokes, colouredMaterial, createView, dot, hiding, legend, lit, outliner, places,
   plainMaterial, restOf, shade, sharedRenderer, spot, surface,
 } from "./view.js";
+
+const CUT = "#cfe3f0"; // the inside of a body without colours
+const NEAR = 14; // pixels between a pointer and the node that it shows
 
 window.truespringScene = (canvas, data, bar) => {
   const renderer = sharedRenderer();
@@ -57,6 +60,11 @@ window.truespringScene = (canvas, data, bar) => {
   const grey = surface(theirs, corners, plainMaterial(GREY, { transparent: true, opacity: 0.8 }));
   const hidesModel = surface(mine, corners, hiding()), hidesOutline = surface(theirs, corners, hiding());
   const coloured = surface(mine, corners, colouredMaterial(), shades);
+  const [plainCap, colouredCap] = [plainMaterial(CUT, { side: DoubleSide }), colouredMaterial()].map((material) => {
+    const cap = new Mesh(new BufferGeometry(), material);
+    cap.frustumCulled = false;
+    return cap;
+  });
   const black = new Map(data.paths.map((path) => [path, new Strokes(path.lines.length ? path.lines : data.edges, INK, 1.5)]));
   const blue = new Strokes(model.lines, BLUE, 1.2);
   const inside = new Strokes(model.inside, BLUE, 0.7, { opacity: 0.3, depthTest: false });
@@ -68,8 +76,81 @@ window.truespringScene = (canvas, data, bar) => {
   const [back, front, top] = [lit(), lit(), lit()];
   back.add(ghost, before, grey, ...black.values());
   [ghost, before, grey, ...black.values()].forEach((one, order) => { one.renderOrder = order; });
-  front.add(hidesModel, coloured, ...tools.flatMap((tool) => [tool.mesh, tool.edges]), elements, inside, blue);
+  front.add(hidesModel, coloured, plainCap, colouredCap, ...tools.flatMap((tool) => [tool.mesh, tool.edges]), elements, inside, blue);
   top.add(hidesOutline, rim);
+
+  // --- a plane that cuts the bodies ------------------------------------------------------------------------------
+
+  const cutting = new Plane();
+  const cuttable = [grey, ...black.values(), hidesModel, coloured, elements, inside, blue, hidesOutline, rim].map((one) => one.material);
+  renderer.localClippingEnabled = true;
+
+  // Keeps the side of an axis below `at`, a share of the box, or above it.
+  function cut({ axis, at, other }) {
+    const sign = other ? 1 : -1, place = (2 * at - 1) * middle[axis];
+    cutting.normal.set(0, 0, 0).setComponent(axis, sign);
+    cutting.constant = -sign * place;
+    for (const one of cuttable) one.clippingPlanes = [cutting];
+  }
+
+  // The polygons in which the plane cuts tetrahedra: corners, and shares for colours at them.
+  function section(points, share) {
+    const corners = [], shares = [], t = data.tetrahedra, { normal, constant } = cutting;
+    const n = [normal.x, normal.y, normal.z], above = (i) => dot(n, points, i) + constant;
+    for (let first = 0; first < t.length; first += 4) {
+      const nodes = [t[first], t[first + 1], t[first + 2], t[first + 3]], heights = nodes.map(above);
+      const [up, down] = [0, 1, 2, 3].reduce(([a, b], k) => (heights[k] > 0 ? [[...a, k], b] : [a, [...b, k]]), [[], []]);
+      if (!up.length || !down.length) continue;
+      const pairs = up.flatMap((i) => down.map((j) => [i, j]));
+      if (pairs.length === 4) pairs.push(...pairs.splice(2, 2).reverse()); // around the quadrilateral
+      const ends = pairs.map(([i, j]) => {
+        const s = heights[i] / (heights[i] - heights[j]), [a, b] = [nodes[i], nodes[j]];
+        return { at: [0, 1, 2].map((k) => points[3 * a + k] + s * (points[3 * b + k] - points[3 * a + k])), share: share(a) + s * (share(b) - share(a)) };
+      });
+      for (let k = 2; k < ends.length; k++) {
+        for (const one of [ends[0], ends[k - 1], ends[k]]) {
+          corners.push(...one.at);
+          shares.push(one.share);
+        }
+      }
+    }
+    return { corners: new Float32Array(corners), shares };
+  }
+
+  function fill(cap, points, share) {
+    const { corners, shares } = section(points, share), colors = places(shares.length);
+    shade(colors, data.colors, (i) => shares[i]);
+    cap.geometry.dispose();
+    cap.geometry = new BufferGeometry();
+    cap.geometry.setAttribute("position", new BufferAttribute(corners, 3));
+    cap.geometry.setAttribute("color", colors);
+  }
+
+  // --- values at the nodes ----------------------------------------------------------------------------------------
+
+  // Words, unit, range and the value of node i of what colours stand for, on the model or on the reference.
+  function quantity(name) {
+    const { reference, mine: a, theirs: b } = shown, path = shown.other ? reference : model, own = shown.other ? b : a;
+    const length = longest / 65535 / data.factor, apart = (p, q) => (i) => length * Math.hypot(p[3 * i] - q[3 * i], p[3 * i + 1] - q[3 * i + 1], p[3 * i + 2] - q[3 * i + 2]);
+    if (name === "distance") {
+      if (!b) return null;
+      const far = reference.farthest;
+      return { title: `distance from ${reference.label}`, unit: data.unit, low: 0, high: far ? length * far.steps : 0, words: far ? far.words : "0", value: apart(a, b) };
+    }
+    if (!own) return null;
+    const of = ` of ${path.label}`;
+    if (name === "displacement") return { title: name + of, unit: data.unit, low: 0, high: length * largest, value: apart(own, data.rest) };
+    const field = data.fields.find((one) => one.name === name), level = path.levels.findIndex((one) => Math.abs(one - model.levels[shown.level]) < 1e-9);
+    const steps = path.fields[name] && path.fields[name][level];
+    return field && steps ? { ...field, title: field.label + of, value: (i) => field.low + ((field.high - field.low) * steps[i]) / field.steps } : null;
+  }
+
+  // The largest displacement of all paths that stay in the picture, in steps.
+  const largest = Math.max(1e-9, ...data.paths.filter((path) => !path.beyond).flatMap((path) => path.positions.map((p) => {
+    let most = 0;
+    for (let i = 0; i < p.length; i += 3) most = Math.max(most, Math.hypot(p[i] - data.rest[i], p[i + 1] - data.rest[i + 1], p[i + 2] - data.rest[i + 2]));
+    return most;
+  })));
 
   // --- drawing --------------------------------------------------------------------------------------------------
 
@@ -81,33 +162,39 @@ window.truespringScene = (canvas, data, bar) => {
     mine.needsUpdate = true;
     if (known) theirs.array.set(metric(shown.theirs));
     theirs.needsUpdate = true;
-    const apart = known && shown.ticked.includes("distance") && corners.count > 0;
-    if (apart) shade(shades, data.colors, distance(reference.farthest));
+    shown.other = known && shown.ticked.includes("other") && shown.color !== "distance";
+    const colours = corners.count && shown.color ? quantity(shown.color) : null, apart = colours !== null;
+    const [own, opposite] = shown.other ? [theirs, mine] : [mine, theirs];
+    const share = (i) => (colours && colours.high > colours.low ? (colours.value(i) - colours.low) / (colours.high - colours.low) : 0);
+    if (apart) shade(shades, data.colors, share);
+    for (const one of cuttable) one.clippingPlanes = null;
+    const cap = apart ? colouredCap : plainCap;
+    plainCap.visible = colouredCap.visible = false;
+    if (shown.cut) {
+      cut(shown.cut);
+      cap.visible = data.tetrahedra.length > 0;
+      if (cap.visible) fill(cap, own.array, share);
+    }
     for (const [path, lines] of black) {
       lines.visible = known && !apart && path === reference && lines.lines.length > 0;
       if (lines.visible) lines.place(theirs.array);
     }
     grey.visible = known && !apart && corners.count > 0;
     coloured.visible = apart;
+    coloured.geometry.setAttribute("position", own);
+    hidesOutline.geometry.setAttribute("position", opposite);
     hidesModel.visible = !apart && corners.count > 0;
     blue.visible = !apart && blue.lines.length > 0;
     inside.visible = !apart && shown.ticked.includes("inside") && inside.lines.length > 0;
     elements.visible = apart;
-    for (const lines of [blue, inside, elements]) lines.place(mine.array);
+    for (const lines of [blue, inside, elements]) lines.place(lines === elements ? own.array : mine.array);
     tools.forEach((tool, k) => {
       const moved = shown.shifts[k].map((value) => value / 65535);
       tool.mesh.position.set(...moved);
       tool.edges.place(tool.at.map((value, i) => value + moved[i % 3]));
     });
-    shown.apart = apart;
+    Object.assign(shown, { colours, opposite: known ? opposite : null });
     view.draw();
-  }
-
-  // How far nodes are from the reference, over the largest distance.
-  function distance(farthest) {
-    const a = shown.mine, b = shown.theirs;
-    if (!farthest) return () => 0;
-    return (i) => Math.hypot(a[3 * i] - b[3 * i], a[3 * i + 1] - b[3 * i + 1], a[3 * i + 2] - b[3 * i + 2]) / farthest.steps;
   }
 
   const turningAway = outliner(data.triangles, data.outline, data.n_nodes);
@@ -116,9 +203,9 @@ window.truespringScene = (canvas, data, bar) => {
     renderer.render(back, camera);
     renderer.clearDepth();
     renderer.render(front, camera);
-    if (!shown.apart) return;
-    rim.join(turningAway(theirs.array, view.axes()));
-    rim.place(theirs.array);
+    if (!shown.colours || !shown.opposite) return;
+    rim.join(turningAway(shown.opposite.array, view.axes()));
+    rim.place(shown.opposite.array);
     renderer.clearDepth();
     renderer.render(top, camera);
   }
@@ -135,8 +222,32 @@ window.truespringScene = (canvas, data, bar) => {
     if (shown.theirs) spot(context, view.pixel(probe(shown.theirs)), "#fff", INK);
     spot(context, view.pixel(probe(shown.mine)), RED, "#fff");
     view.rule();
-    const { reference } = shown;
-    if (shown.apart) legend(context, data.colors, `distance from ${reference.label}`, reference.farthest ? reference.farthest.words : "0", width);
+    if (shown.node >= 0) spot(context, view.pixel(metric(shown.mine.slice(3 * shown.node, 3 * shown.node + 3))), "#ffd23f", INK, 5.5);
+    const { colours } = shown;
+    if (colours) legend(context, data.colors, colours.title, colours.words || written(colours.high, colours.unit), width, written(colours.low, ""));
+  }
+
+  const written = (value, unit) => `${+value.toPrecision(3)}${unit && " " + unit}`;
+
+  // The nodes on the surface, and the one of them at a pixel that is nearest to the eye; -1 without one.
+  const candidates = corners.count ? [...new Set(data.triangles)].sort((a, b) => a - b) : [...Array(data.n_nodes).keys()];
+  function pick([x, y]) {
+    const { towards } = view.axes(), found = [];
+    for (const i of candidates) {
+      if (shown.cut && cutting.normal.x * mine.array[3 * i] + cutting.normal.y * mine.array[3 * i + 1] + cutting.normal.z * mine.array[3 * i + 2] + cutting.constant < 0) continue;
+      const [u, v] = view.pixel(mine.array, i), away = Math.hypot(u - x, v - y);
+      if (away < NEAR) found.push({ i, away, depth: dot(towards, mine.array, i) });
+    }
+    const front = Math.max(...found.map((one) => one.depth)) - 0.03;
+    return found.filter((one) => one.depth >= front).reduce((best, one) => (one.away < best.away ? one : best), { i: -1, away: Infinity }).i;
+  }
+
+  // What is known of a node besides its displacement.
+  function values(node) {
+    return ["distance", ...data.fields.map((field) => field.name)].map((name) => {
+      const known = quantity(name);
+      return known && `${known.label || known.title} ${written(known.value(node), known.unit)}`;
+    }).filter(Boolean);
   }
 
   const probe = (steps) => metric(steps.slice(3 * data.probe, 3 * data.probe + 3));
@@ -158,5 +269,5 @@ window.truespringScene = (canvas, data, bar) => {
   const size = (width) => shown && Math.round(Math.max(Math.min(width, 340), Math.min(0.6 * width, 0.62 * innerHeight, 540)));
   const scenes = [back, front, top];
   const view = createView(canvas, renderer, { scenes, strokes, include, size, render, marks, bar, unit: data.unit, longest });
-  return paint;
+  return Object.assign(paint, { pick, values, candidates });
 };

@@ -117,8 +117,8 @@ export function shade(shades, colors, share) {
   shades.needsUpdate = true;
 }
 
-// The ramp from 0 to the largest distance, with a title.
-export function legend(context, colors, title, words, width) {
+// The ramp from the smallest value, 0 for distances, to the largest, with a title.
+export function legend(context, colors, title, words, width, from = "0") {
   const [x, y, long, thick] = [14, 24, Math.min(170, width / 2), 9];
   const ramp = context.createLinearGradient(x, 0, x + long, 0);
   colors.forEach((color, i) => ramp.addColorStop(i / (colors.length - 1), `rgb(${color})`));
@@ -129,7 +129,7 @@ export function legend(context, colors, title, words, width) {
   context.fillStyle = SOFT;
   context.font = "12px system-ui, sans-serif";
   context.fillText(title, x, y - 8);
-  context.fillText("0", x, y + thick + 14);
+  context.fillText(from, x, y + thick + 14);
   context.textAlign = "end";
   context.fillText(words, x + long, y + thick + 14);
   context.textAlign = "start";

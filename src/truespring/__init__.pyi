@@ -60,17 +60,28 @@ from .reference import read_result as read_result
 from .reference import read_stl as read_stl
 from .refining import OwnError as OwnError
 from .refining import reference_error as reference_error
+from .report.result import Result as Result
+from .showing.progress import ProgressBar as ProgressBar
 from .solvers import ArcLength as ArcLength
 from .solvers import DisplacementControl as DisplacementControl
 from .solvers import Newton as Newton
+from .study import Study as Study
 from .study import read_network as read_network
+from .study import read_study as read_study
+from .sweeping import Sweep as Sweep
 from .sweeping import sweep as sweep
+from .templates import new as new
 from .tools import Block as Block
 from .tools import Capsule as Capsule
 from .tools import Grasp as Grasp
 from .tools import HalfSpace as HalfSpace
 from .tools import Sphere as Sphere
 from .tools import StlTool as StlTool
+from .validity import Validity as Validity
 from .validity import map_validity as map_validity
+from .verifying import verify as verify
+from .versions import Report as Report
 from .vibration import Modes as Modes
 from .vibration import modes as modes
+
+__version__: str

@@ -79,6 +79,12 @@ class Comparison:
     def __repr__(self) -> str:
         return f"Comparison({self})"
 
+    def _repr_html_(self) -> str:
+        """Return the comparison as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
+
     def last(self, errors: Floats, worst: bool = False) -> float:
         """Return the last of the errors at the levels, or their root mean square over the way; NaN without any.
 

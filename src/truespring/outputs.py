@@ -3,8 +3,8 @@
 import json
 import os
 import shutil
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -89,6 +89,16 @@ class Output:
         write_whole(self.folder / _LISTED, json.dumps(listed, indent=1).encode())
 
 
+@contextmanager
+def writing(out: Path) -> Iterator[None]:
+    """Convert an OSError to an OutputError that names the file and the folder of the results."""
+    try:
+        yield
+    except OSError as error:
+        place = error.filename or out
+        raise OutputError(f"out = {out}: {place} cannot be written: {error.strerror}") from None
+
+
 class Lock:
     """Create and lock a folder until `release` or the end of the process.
 
@@ -142,7 +152,7 @@ def _locked(folder: Path) -> int | None:
     except BlockingIOError:
         os.close(descriptor)
         raise OutputError(
-            f"{folder}: another run is writing to this folder: wait until it ends, or choose another --out"
+            f"{folder}: another run is writing to this folder: wait until it ends, or choose another folder (out)"
         ) from None
     except OSError:
         os.close(descriptor)

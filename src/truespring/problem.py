@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from truespring.mesh import MIXED, Mesh, Selection, element_corner_measures, sel
 from truespring.mesh.selections import AXES
 from truespring.rigid_modes import centred, modes_at, n_modes
 from truespring.tools import TOOLS, Grasp, Tool, varies
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _Found = TypeVar("_Found")
 
@@ -66,6 +69,16 @@ class Problem:
 
     Raises ProblemError or MeshError if the parts do not fit together, if there is no load, or if the body or a
     disconnected part of it can move as a rigid body.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.16, 0.04), (16, 4)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.0, -0.043))],
+        ... )
     """
 
     mesh: Mesh
@@ -133,6 +146,28 @@ class Problem:
                     '[["0 s", 0], ["50 ms", 1]]',
                 )
         _ = self.loading
+
+    def _repr_html_(self) -> str:
+        """Return the problem as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
+
+    def plot(self, model: Any = None, ax: "Axes | None" = None) -> "Axes":
+        """Draw the undeformed body with supports, loads and tools, as `truespring check` does.
+
+        Args:
+            model: springs to draw, such as Springs("gaussian"); by default none.
+            ax: axes of matplotlib to draw in; by default those of a new figure.
+
+        Returns the axes. Raises ModelError if the model does not fit the problem.
+
+        Example:
+            >>> axes = problem.plot(ts.Springs("gaussian"))
+        """
+        from truespring.showing.problems import plot_problem
+
+        return plot_problem(self, model, ax)
 
     @property
     def mass(self) -> Floats:

@@ -1,6 +1,7 @@
 """The result of solve: a Solution, its States, and the Status in which it ended."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -148,6 +149,22 @@ class Solution:
         n_unknowns: number of free directions of all nodes, 0 if nothing was solved.
         cost: methods and costs of the solver, None if nothing was solved here.
         held: directions that supports hold, shape (n_nodes, dim), if the file gives them; else None.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.16, 0.04), (16, 4)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.0, -0.043))],
+        ... )
+        >>> reference = ts.solve(problem, ts.Fem("neo-hookean"), ts.Newton(load_steps=2))
+        >>> solution = ts.solve(problem, ts.Springs("gaussian"), ts.Newton(load_steps=2))
+        >>> solution
+        Solution(springs (gaussian), converged, 3 states up to load factor 1)
+        >>> solution.states[-1].displacement.shape
+        (85, 2)
     """
 
     problem: Problem
@@ -261,14 +278,22 @@ class Solution:
     def write(self, file: str | Path, level: int = -1) -> Path:
         """Write the solution to a file, in SI units; its suffix selects the format.
 
-        .pvd: all states, one .vtu each, for ParaView, as `truespring verify` writes them. .vtu: the state `level`.
-        .stl: the deformed body of the last state. .csv: the table of `table`, with units in the header line.
+        .pvd: all states, one .vtu each, for ParaView, as `truespring verify` writes them. .vtkhdf: the same as one file
+        of HDF5, with the undeformed body once (pip install 'truespring[vtkhdf]'). .vtu: the undeformed body with the
+        fields of one state. .stl: the deformed body of one state. .csv: position and displacement of all nodes at all
+        states, with units in the header line; `truespring compare` and `read_result` read it.
 
         Args:
             file: the file; its folder is created.
-            level: number of the state of a .vtu file, counted from the end if negative.
+            level: number of the state of a .vtu or .stl file, counted from the end if negative.
 
         Returns the path of the file. Raises OutputError for another suffix or level.
+
+        Example:
+            >>> solution.write("bent.pvd").name
+            'bent.pvd'
+            >>> print(ts.compare(solution, ts.read_result(solution.write("bent.csv"))))
+            springs (gaussian) against bent.csv: 0.0% rms at full load, within 5% up to load factor 1
         """
         from truespring.showing.writing import write_solution
 
@@ -285,12 +310,17 @@ class Solution:
             warped: whether points are the deformed positions [m]; else the undeformed ones.
 
         Raises OutputError if there is no such state or PyVista is not installed.
+
+        Example:
+            >>> grid = solution.to_pyvista()
+            >>> grid["displacement"].shape, grid["stress"].shape
+            ((85, 3), (340, 9))
         """
         from truespring.showing.grids import solution_grid
 
         return solution_grid(self, level, warped)
 
-    def table(self, probe: int | None = None) -> Any:
+    def table(self, probe: int | str | Sequence[float] | None = None) -> Any:
         """Return a table with one row for each state: a pandas DataFrame, of polars if pandas is not installed.
 
         Columns: load_factor, in a motion time [s], displacement of the probe ux, uy[, uz] [m], applied force fx, fy[,
@@ -298,22 +328,48 @@ class Solution:
         stable, unstable or the kind of a critical point. The units are in `attrs["units"]` of a pandas table.
 
         Args:
-            probe: number of a node; by default the node that moves most.
+            probe: number of a node, a point such as "right-middle", or a position [m], whose nearest node is taken; by
+                default the node that moves most.
 
-        Raises OutputError if neither library is installed, or the solution has no states.
+        Raises OutputError if neither library is installed, the solution has no states, or there is no such node.
+
+        Example:
+            >>> table = solution.table(probe="right-middle")
+            >>> table[["load_factor", "fy", "state"]]
+               load_factor      fy   state
+            0          0.0  0.0000  stable
+            1          0.5 -0.0215  stable
+            2          1.0 -0.0430  stable
+            >>> table.attrs["units"]["uy"]
+            'm'
         """
         from truespring.showing.tables import table_of
 
         return table_of(self, probe)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return the states as arrays over level, node and component; units are in the attributes.
+        """Return the states as arrays over level, node and component, with units in their attributes.
+
+        Variables are displacement [m], reaction [N], applied_force [N], energy [J] and, of a motion, velocity [m/s];
+        coordinates are the load_factor of the levels, of a motion their time [s], and x, y[, z] of the nodes [m].
 
         Raises OutputError if xarray is not installed or the solution has no states.
+
+        Example:
+            >>> arrays = solution.to_xarray()
+            >>> tip = arrays.displacement.where(arrays.x > 0.159, drop=True).mean("node")
+            >>> tip.sel(component="y").dims
+            ('level',)
         """
         from truespring.showing.tables import arrays_of
 
         return arrays_of(self)
+
+    def _repr_html_(self) -> str:
+        """Return the solution as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
 
     def plot(
         self,
@@ -336,6 +392,11 @@ class Solution:
             magnify: factor of the displacements, by default 1 unless they are too small to see.
 
         Returns the axes. Raises OutputError if the solution does not have the level or the quantity.
+
+        Example:
+            >>> axes = solution.plot(over=reference)
+            >>> axes = solution.plot(color="stress")
+            >>> axes.figure.savefig("stress.png")
         """
         from truespring.showing.plotting import plot_solution
 
@@ -349,6 +410,10 @@ class Solution:
             over: a reference, drawn in black.
 
         Returns the path of the file. Raises OutputError for another suffix, fewer than two levels, or if ffmpeg fails.
+
+        Example:
+            >>> solution.animate("bent.gif", over=reference).name
+            'bent.gif'
         """
         from truespring.showing.films import animate
 

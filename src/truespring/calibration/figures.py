@@ -7,6 +7,7 @@ import numpy as np
 
 from truespring.arrays import Floats, Ints
 from truespring.calibration.fitted import CaseResult, Fitted
+from truespring.calibration.shapes import shape_figure
 from truespring.report.frame import EDGE, GRID, draw_bar, draw_frame, round_numbers, written
 from truespring.report.lines import draw_lines
 from truespring.report.plots import Curve, plot
@@ -34,6 +35,9 @@ def calibration_figures(found: Fitted) -> Iterator[tuple[str, Sheet]]:
     if lattice is not None and found.unknowns.problem.mesh.dim == 2 and len(lattice[0]) <= _MOST_SPRINGS:
         yield "lattice", lattice_figure(found.unknowns.problem.mesh.nodes, *lattice)
     for number, one in enumerate(found.cases, 1):
+        shape = shape_figure(one)
+        if shape is not None:
+            yield f"shape_{number}", shape
         if len(one.deciding(one.before)) > 1:
             yield f"case_{number}", case_figure(one)
 

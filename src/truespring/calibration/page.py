@@ -1,5 +1,7 @@
 """A calibration as a table for a terminal, as JSON values, and as a page."""
 
+import csv
+import io
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -8,6 +10,7 @@ import numpy as np
 
 from truespring.calibration.figures import calibration_figures
 from truespring.calibration.fitted import CaseResult, Fitted
+from truespring.report.downloads import table_download
 from truespring.report.drawing import Drawing, drawings
 from truespring.report.quantity import percent
 from truespring.report.shell import picture, render
@@ -34,11 +37,17 @@ def calibration_table(title: str, found: Fitted) -> "Table":
         ("calibrated", "right"),
     ):
         table.add_column(name, justify="right" if justify == "right" else "left")
-    for row in _rows(found):
-        table.add_row(
-            row["name"], "held out" if row["held_out"] else "fitted", row["quantity"], row["before"], row["after"]
-        )
+    for row in case_rows(found):
+        table.add_row(*row)
     return table
+
+
+def case_rows(found: Fitted) -> list[tuple[str, ...]]:
+    """Return for each load case and quantity its name, whether it was fitted, the quantity, and both errors."""
+    return [
+        (row["name"], "held out" if row["held_out"] else "fitted", row["quantity"], row["before"], row["after"])
+        for row in _rows(found)
+    ]
 
 
 def _rows(found: Fitted) -> list[dict[str, Any]]:
@@ -154,8 +163,10 @@ def render_calibration(
         identifiability=identified.sentence,
         trouble=not found.held_out or found.error is None,
         warnings=found.warnings,
-        errors=[picture(drawing, name) for name, drawing in drawings.items() if name not in ("unknowns", "lattice")],
-        unknowns=[picture(drawing, name) for name, drawing in drawings.items() if name in ("unknowns", "lattice")],
+        shapes=_pictures(drawings, "shape_"),
+        errors=_pictures(drawings, "errors", "case_"),
+        unknowns=_pictures(drawings, "unknowns", "lattice"),
+        downloads=[table_download("calibration_errors.csv", _errors_text(found), "errors before and after")],
         rows=_rows(found),
         method=_method(found),
         of=identified.of,
@@ -166,6 +177,20 @@ def render_calibration(
         ],
         files=f"Files in this folder: {', '.join(names)}.",
     )
+
+
+def _pictures(drawings: Mapping[str, Drawing], *begins: str) -> list[dict[str, str]]:
+    """Return the pictures whose names begin with one of `begins`."""
+    return [picture(drawing, f"calibration_{name}") for name, drawing in drawings.items() if name.startswith(begins)]
+
+
+def _errors_text(found: Fitted) -> str:
+    """Return `Fitted.rows` as the text of a CSV file."""
+    stream = io.StringIO()
+    table = csv.DictWriter(stream, list(found.rows[0]))
+    table.writeheader()
+    table.writerows(found.rows)
+    return stream.getvalue()
 
 
 def fitted_sentence(found: Fitted) -> str:

@@ -1,16 +1,18 @@
 """The result of `calibrate`: springs and their errors, as table, figures and files."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from truespring.calibration.figures import calibration_figures
 from truespring.calibration.files import write_fitted
 from truespring.calibration.fitted import Fitted
-from truespring.calibration.page import calibration_values
+from truespring.calibration.page import calibration_values, case_rows
 from truespring.outputs import Output
 from truespring.report.drawing import Figures, sheets
 from truespring.report.rows import table_of
+from truespring.showing.cards import Card, png_of_sheet
 
 if TYPE_CHECKING:
     import polars
@@ -22,6 +24,12 @@ class Calibration(Fitted):
 
     def __repr__(self) -> str:
         return f"Calibration({self.headline})"
+
+    def _repr_html_(self) -> str:
+        """Return the errors as HTML for a notebook: a table and the first figure."""
+        figure = next(iter(self.figures().values()))
+        columns = ("load", "", "of the", "rule", "calibrated")
+        return Card("Calibration", (), self.headline, columns, case_rows(self), partial(png_of_sheet, figure)).html()
 
     def table(self) -> "polars.DataFrame":
         """Return `rows` as a table of polars."""

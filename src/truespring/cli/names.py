@@ -48,6 +48,7 @@ READERS = (
     ".pvts",
     ".pvtr",
     ".pvd",
+    ".vtkhdf",
     ".rst",
     ".csv",
     ".stl",

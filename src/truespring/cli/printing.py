@@ -5,11 +5,9 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from truespring.errors import OutputError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -86,14 +84,11 @@ def print_file(options: argparse.Namespace, what: str, file: object) -> None:
         show(file if options.quiet else f"{what}: {file}")
 
 
-@contextmanager
-def writing(out: Path) -> Iterator[None]:
-    """Convert an OSError to an OutputError that names --out."""
-    try:
-        yield
-    except OSError as error:
-        place = error.filename or out
-        raise OutputError(f"--out {out}: {place} cannot be written: {error.strerror}") from None
+def writing(out: Path) -> AbstractContextManager[None]:
+    """Convert an OSError to an OutputError that names the folder of the results."""
+    from truespring.outputs import writing
+
+    return writing(out)
 
 
 def reserve(options: argparse.Namespace, studies: "Sequence[Study]" = ()) -> None:

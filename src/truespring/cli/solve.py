@@ -1,20 +1,15 @@
 """The verbs `verify` and `solve`: solve every model of a study, with or without comparison and report."""
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from truespring.cli.moduli import print_moduli
-from truespring.cli.printing import console, print_each, print_file, progress, reserve, say, writing
+from truespring.cli.printing import console, print_each, print_file, progress, reserve, say
 from truespring.cli.verb import CONVERGED, NOT_CONVERGED, Verb, add_out, add_studies, add_timeout
 
 if TYPE_CHECKING:
-    from truespring.equilibrium import Solution
-    from truespring.outputs import Output
     from truespring.report.result import Result
-    from truespring.study import Known, Study
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +27,8 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
     from truespring.report.summary import summary
     from truespring.report.tables import result_tables
     from truespring.report.verdict import verdict
-    from truespring.study import read_studies, realised_moduli, run, verify_command, write_overview, write_rest
+    from truespring.study import read_studies, realised_moduli, run
+    from truespring.verifying import verify_each
 
     studies = read_studies(options.study)
     options.launch.check_studies(studies)
@@ -42,15 +38,16 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
     reserve(options, studies)
     screen = console(options)
     results = []
-    for study in studies:
-        with _output(study, options.out) as (output, known):
-            with progress(options) as advance:
-                result = run(study, advance, comparing, options.timeout, known)
-            results.append(result)
-            with writing(options.out):
-                (options.out / "report.html").unlink(missing_ok=True)  # a report of an earlier command
-                command = verify_command([result], options.out, options.animate) if comparing else None
-                note = write_rest(result, output, command, options.animate)
+    several = verify_each(
+        studies,
+        options.out,
+        lambda: progress(options),
+        comparing=comparing,
+        timeout=options.timeout,
+        animate=options.animate,
+    )
+    for study, (result, note) in zip(studies, several, strict=True):
+        results.append(result)
         if note and not options.quiet:
             say(f"note: {study.stem}: {note}")
         if not screen.quiet:
@@ -59,30 +56,12 @@ def _run(options: argparse.Namespace, comparing: bool) -> int:
         for part in result_tables(result):
             screen.print(part)
     if comparing:
-        with writing(options.out):
-            write_overview(results, options.out, options.animate)
         print_file(options, "report", options.out / "report.html")
     if options.json:
         print_each({result.stem: summary(result) for result in results})
     for result in results:
         print_failures(result, options.out, shown=not screen.quiet)
     return CONVERGED if all(result.converged for result in results) else NOT_CONVERGED
-
-
-@contextmanager
-def _output(study: "Study", out: Path) -> "Iterator[tuple[Output, Known]]":
-    """Yield the output of a study, and a callback that writes the results of a model to it."""
-    from truespring.study import output, write_model
-
-    with writing(out):
-        opened = output(study, out)
-
-    def known(name: str, path: "Solution") -> None:
-        with writing(out):
-            write_model(path, opened, name)
-
-    with opened:
-        yield opened, known
 
 
 def print_failures(result: "Result", out: Path, shown: bool) -> None:

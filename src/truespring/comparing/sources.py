@@ -23,6 +23,7 @@ from truespring.outputs import UNFINISHED
 from truespring.problem import Problem
 from truespring.reactions import SupportForce, torque_axes
 from truespring.reference import Placing, format_of, placed, read_record, read_shell, read_stl
+from truespring.report.series import SERIES
 from truespring.study.read import Study, read_study
 from truespring.study.run import follow
 from truespring.study.schema.models import MODEL_KINDS
@@ -169,9 +170,10 @@ def _of_folder(source: Source, advance: Callable[[float], None]) -> Solution:
     """Return a path from a result folder: its VTU series, summary, curves and reactions."""
     folder, name = source.file, str(source.model)
     saved = _json(folder / "summary.json")["models"][name]
-    series, elements = folder / f"{name}.pvd", folder / "mesh.vtu"
-    if not series.is_file():
-        raise ReferenceFileError(f"{series} does not exist: the folder has no levels of '{name}'")
+    files, elements = [folder / f"{name}{form.suffix}" for form in SERIES.values()], folder / "mesh.vtu"
+    series = next((file for file in files if file.is_file()), None)
+    if series is None:
+        raise ReferenceFileError(f"{files[0]} does not exist: the folder has no levels of '{name}'")
     record = _record(series, FileOptions(), advance)
     if elements.is_file():  # a series of springs holds lines; the body has elements
         mesh = read_mesh(elements)

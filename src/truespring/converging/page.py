@@ -1,17 +1,14 @@
 """A refinement as rows, as a table for a terminal and as a page."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from truespring.converging.settling import Refinement, Settling
+from truespring.converging.figures import settling_figures
+from truespring.converging.settling import Refinement
+from truespring.report.downloads import table_download
 from truespring.report.drawing import drawings
-from truespring.report.plots import Curve, plot
-from truespring.report.sheet import Sheet
 from truespring.report.shell import pictures, render
-from truespring.report.style import SPRING_STYLES
 from truespring.report.tables import new_table
 
 if TYPE_CHECKING:
@@ -38,8 +35,26 @@ def settling_table(title: str, found: Refinement) -> "Table":
     return table
 
 
-def render_settling(title: str, file: Path, found: Refinement, command: str | None) -> str:
-    """Return the page as HTML; `command` is the command line that repeats the run."""
+def _mesh_rows(found: Refinement) -> Iterator[tuple[str, str, Sequence[str]]]:
+    """Yield model, quantity with its unit, and the value on each mesh as text."""
+    for one in found.nonzero:
+        known = dict(zip(one.n_nodes, one.values, strict=True))
+        yield one.model, f"{one.quantity} [{one.unit}]", [_known(known.get(count)) for count in found.n_nodes]
+
+
+def _known(value: float | None) -> str:
+    return "–" if value is None else f"{value:.6g}"
+
+
+def render_settling(title: str, file: Path, found: Refinement, command: str | None, table: str) -> str:
+    """Return the page as HTML.
+
+    Args:
+        title, file: of the study.
+        found: the refinement.
+        command: the command line that repeats the run.
+        table: the text of converge.csv.
+    """
     return render(
         "converging/page.html.j2",
         command,
@@ -48,6 +63,9 @@ def render_settling(title: str, file: Path, found: Refinement, command: str | No
         sentence=found.sentence,
         settled=found.settled,
         n_nodes=", ".join(f"{count:,}" for count in found.n_nodes),
+        meshes=[f"{count:,}" for count in found.n_nodes],
+        mesh_rows=list(_mesh_rows(found)),
+        downloads=[table_download(f"{file.stem}_converge.csv", table, "value of each watched quantity on each mesh")],
         troubles=[
             f"{one.model} on {one.n_nodes:,} nodes: {one.status}, up to load factor {one.load_factor:.4g}; {one.advice}"
             for one in found.attempts
@@ -56,22 +74,3 @@ def render_settling(title: str, file: Path, found: Refinement, command: str | No
         pictures=pictures(drawings(settling_figures(found)), file.stem),
         rows=list(settling_rows(found)),
     )
-
-
-def settling_figures(found: Refinement) -> Iterator[tuple[str, Sheet]]:
-    """Yield the figure of each quantity over its limit by mesh; none with fewer than two meshes."""
-    several = [one for one in found.nonzero if len(one.values) > 1]
-    if not several:
-        return
-    curves = []
-    for place, one in enumerate(several):
-        meshes = np.array([found.n_nodes.index(count) + 1.0 for count in one.n_nodes])
-        shares = 100 * np.array(one.values) / _limit(one)
-        style = SPRING_STYLES[place % len(SPRING_STYLES)]
-        curves.append(Curve(meshes, shares, *style, label=f"{one.quantity}\n{one.model}", strong=False))
-    yield "converge", plot("Watched quantities over their limits", "mesh", "share [%]", curves, far=True).sheet
-
-
-def _limit(one: Settling) -> float:
-    """Return the extrapolated value of a quantity, else its last value."""
-    return one.values[-1] if one.extrapolated is None else one.extrapolated

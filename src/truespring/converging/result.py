@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from truespring.converging.page import render_settling, settling_figures
+from truespring.converging.figures import settling_figures
+from truespring.converging.page import render_settling
 from truespring.converging.settling import Refinement
 from truespring.outputs import Output
 from truespring.report.drawing import Figures, sheets
@@ -55,7 +56,8 @@ class StudyRefinement(Refinement):
                 table = csv.writer(stream)
                 table.writerow(["model", "quantity", "unit", "n_nodes", "value"])
                 table.writerows([*list(row.values())[:-1], repr(row["value"])] for row in self.rows)
-            page = render_settling(self.title, self.file, self, command)
+            text = (folder / "converge.csv").read_text(encoding="utf-8")
+            page = render_settling(self.title, self.file, self, command, text)
             (folder / "converge.html").write_text(page, encoding="utf-8")
             text = json.dumps([asdict(one) for one in self.quantities], indent=1, allow_nan=False)
             (folder / "converge.json").write_text(text + "\n", encoding="utf-8")

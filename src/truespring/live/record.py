@@ -15,7 +15,7 @@ from truespring.live.lives import Life, lives
 from truespring.live.session import Live, replayed
 from truespring.live.tables import session_tables
 from truespring.mesh.selections import AXES
-from truespring.study import PATH_COLUMNS, PATH_PLACE, Study, moved_document, read_study, toml_text
+from truespring.study import PATH_COLUMNS, PATH_PLACE, Study, moved_document, read_text, toml_text
 
 #: The files of a session: the study that solves it again, the table of commands and places, the study it began with.
 SESSION, PULL, BEGUN = "session.toml", "pull.csv", "study.toml"
@@ -176,7 +176,7 @@ def read_session(folder: str | Path) -> Recorded:
         frame, step = (float(settings[key][1]) for key in ("frame", "scheme"))
     except ValueError as error:
         raise LiveError(f"{file}: value of a setting: {error}") from None
-    study = read_study(folder / BEGUN, halvings, balanced=False)
+    study = read_text(folder / BEGUN).study(halvings=halvings, balanced=False)
     model = settings["model"][0]
     if model not in study.entries:
         raise LiveError(f"{file}: model '{model}' is not in {BEGUN}; there are: {', '.join(study.entries)}")

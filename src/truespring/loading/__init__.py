@@ -10,6 +10,7 @@ from truespring.loading.dead import Gravity as Gravity
 from truespring.loading.dead import Traction as Traction
 from truespring.loading.history import History as History
 from truespring.loading.history import amplitude_of as amplitude_of
+from truespring.loading.load import Along as Along
 from truespring.loading.load import BodyForce as BodyForce
 from truespring.loading.load import DeadLoad as DeadLoad
 from truespring.loading.load import FacePressure as FacePressure

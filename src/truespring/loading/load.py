@@ -22,6 +22,7 @@ class Mark(NamedTuple):
         symbol: symbol in the label, such as "F".
         size: value in the label, in `unit`.
         unit: an SI unit as `report.quantity` writes it ("N", "Pa", "m"), or "°".
+        along: facets on which small arrows are drawn instead, each along its own force; None for one arrow.
     """
 
     nodes: Ints
@@ -29,6 +30,21 @@ class Mark(NamedTuple):
     symbol: str
     size: float
     unit: str
+    along: "Along | None" = None
+
+
+class Along(NamedTuple):
+    """The facets of a load that differs in direction along a side, shape (n, dim) each.
+
+    Attributes:
+        centres: of the facets [m].
+        outward: their unit normals, out of the body.
+        forces: directions of the load on them, of any length.
+    """
+
+    centres: Floats
+    outward: Floats
+    forces: Floats
 
 
 class BodyForce(NamedTuple):

@@ -15,7 +15,7 @@ from truespring.arrays import Bools, Floats, Ints
 from truespring.assembly import Pattern
 from truespring.loading.body import Body
 from truespring.loading.history import History
-from truespring.loading.load import FacePressure, FollowingLoad, Mark
+from truespring.loading.load import Along, FacePressure, FollowingLoad, Mark
 from truespring.loading.values import number
 from truespring.loading.words import selection_words
 from truespring.mesh import CELL_SHAPES, Mesh, Selection, loaded, outer_facets, quadrature
@@ -64,14 +64,25 @@ class Pressure(FollowingLoad):
         return replace(self, pressure=factor * self.pressure)
 
     def mark(self, body: Body, held: Bools) -> Mark:
-        """Return an arrow along the total force on the undeformed body, or on one node if that is zero."""
+        """Return the facets, and an arrow along the total force on the body at rest, or on one node if it is zero."""
         force = -self.following(body, held).gradient(body.nodes)
         nodes = loaded(body.mesh, self.on)
         total = force.sum(axis=0)
         if np.linalg.norm(total) < _BALANCED * np.abs(force).sum():  # a closed surface
             nodes = nodes[[body.mesh.nodes[nodes, 0].argmax()]]
             total = force[nodes[0]]
-        return Mark(nodes, total, "p", self.pressure, "Pa")
+        return Mark(nodes, total, "p", self.pressure, "Pa", self._along(body.mesh))
+
+    def _along(self, mesh: Mesh) -> Along:
+        corners = mesh.nodes[outer_facets(mesh, self.on)]
+        if mesh.dim == 2:
+            across = (corners[:, 1] - corners[:, 0])[:, ::-1] * np.array([1.0, -1.0])
+        else:
+            across = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])
+            if corners.shape[1] == 3:
+                across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        outward = across / np.linalg.norm(across, axis=1, keepdims=True)
+        return Along(corners.mean(axis=1), outward, -self.pressure * outward)
 
     def words(self) -> str:
         """Return the pressure and where it acts."""

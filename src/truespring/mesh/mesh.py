@@ -1,7 +1,7 @@
 """The mesh: nodes, elements of one or several kinds, groups, and derived quantities."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -22,6 +22,7 @@ from truespring.mesh.rows import ascending, distinct_rows
 
 if TYPE_CHECKING:
     import pyvista
+    from matplotlib.axes import Axes
 
 # An element is degenerate where its corner Jacobian is below this share of its longest edge to the power of its
 # dimension: elements a thousand times longer than wide, as shapes allow, are well above.
@@ -55,6 +56,16 @@ class Mesh:
 
     Raises MeshError if arrays do not match, an element is inverted, degenerate or duplicate, or a node belongs to no
     element.
+
+    Example:
+        >>> import numpy as np
+        >>> import truespring as ts
+        >>> nodes = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
+        >>> mesh = ts.Mesh(nodes, np.array([[0, 1, 2], [0, 2, 3]]), "triangle", node_groups={"foot": np.array([0, 1])})
+        >>> mesh
+        Mesh(4 nodes, 2 elements: triangle)
+        >>> mesh.measures
+        array([0.005, 0.005])
     """
 
     nodes: Floats
@@ -124,7 +135,18 @@ class Mesh:
             unit: unit of its points, such as "mm"; a number is in metres.
             join: whether to merge coincident nodes; by default only if no two elements share a node.
 
+        Boolean arrays become groups of their name, other integer arrays as in files; inverted elements are mirrored,
+        nodes without an element left out, and the notes of the mesh say so.
+
         Raises MeshError if the grid contains no body.
+
+        Example:
+            >>> import pyvista
+            >>> image = pyvista.ImageData(dimensions=(5, 3, 3), spacing=(10.0, 10.0, 10.0))
+            >>> image.cell_data["soft"] = image.cell_centers().points[:, 0] > 20.0
+            >>> organ = ts.Mesh.from_pyvista(image, unit="mm")
+            >>> organ, [*organ.element_groups]
+            (Mesh(45 nodes, 16 elements: hexahedron), ['soft'])
         """
         from truespring.showing.reading import mesh_of_pyvista
 
@@ -139,20 +161,62 @@ class Mesh:
             unit: unit of its points, such as "mm"; a number is in metres.
             join: whether to merge coincident nodes; by default only if no two elements share a node.
 
+        Point sets and cell sets become groups, and so do gmsh's physical groups and integer arrays, as in files;
+        inverted elements are mirrored, nodes without an element left out, and the notes of the mesh say so.
+
         Raises MeshError if the mesh contains no body.
+
+        Example:
+            >>> import meshio
+            >>> square = meshio.Mesh(1e3 * mesh.nodes, [("triangle", mesh.elements)], cell_sets={"half": [[1]]})
+            >>> ts.Mesh.from_meshio(square, unit="mm").element_groups["half"]
+            array([1])
         """
         from truespring.showing.reading import mesh_of_meshio
 
         return mesh_of_meshio(mesh, unit, join)
 
     def to_pyvista(self) -> "pyvista.UnstructuredGrid":
-        """Return the mesh as a grid of PyVista [m]; groups are arrays of truth values, named as the groups.
+        """Return the mesh as a grid of PyVista [m], which `from_pyvista` reads back.
+
+        Groups of nodes and elements are boolean arrays of their name. Groups of facets are integer arrays
+        "facets:NAME", of which bit i is set if facet i of the element belongs to the group. Meshes with `middles` have
+        cells of second order.
 
         Raises OutputError if PyVista is not installed.
+
+        Example:
+            >>> mesh.to_pyvista()["foot"].tolist()
+            [True, True, False, False]
         """
         from truespring.showing.grids import mesh_grid
 
         return mesh_grid(self)
+
+    def _repr_html_(self) -> str:
+        """Return the mesh as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
+
+    def plot(self, names: Sequence[str] | None = None, ax: "Axes | None" = None) -> "Axes":
+        """Draw the mesh by matplotlib, with named parts in colours.
+
+        Data of the axes are in metres, numbers are written in a unit that fits. In space the body is an image.
+
+        Args:
+            names: groups, sides such as "left" or points such as "right-middle"; by default all groups (ten at most),
+                or the sides of a mesh without groups.
+            ax: axes to draw in; by default those of a new figure.
+
+        Returns the axes. Raises MeshError for a name that matches no node.
+
+        Example:
+            >>> axes = mesh.plot(["foot", "top"])
+        """
+        from truespring.showing.meshes import plot_mesh
+
+        return plot_mesh(self, names, ax)
 
     def _check(self) -> None:
         if not len(self.nodes) or not len(self.elements):

@@ -79,6 +79,12 @@ class Moduli:
             f"young in all directions={lowest:.6g} to {highest:.6g} Pa, anisotropy={self.anisotropy:.4g})"
         )
 
+    def _repr_html_(self) -> str:
+        """Return the moduli as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
+
     @property
     def dim(self) -> int:
         """Dimension of the body, 2 or 3."""

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 from truespring.equilibrium import Solution
 from truespring.errors import ReferenceFileError, nearest
-from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, is_vtk_xml, listed_keys, read_as
-from truespring.mesh.files.vtk_file import VTK_FORMATS
+from truespring.mesh.files.heads import HEAD, Recognises, format_by_head, listed_keys, read_as
 from truespring.opening import open_file
 from truespring.plugins import Table
 from truespring.reference.checks import refuse_unreadable
@@ -20,7 +19,7 @@ from truespring.reference.placing import Placing, placed
 from truespring.reference.record import Reading, Record
 from truespring.reference.rst import is_rst, read_rst
 from truespring.reference.stl_record import is_stl, read_stl_pair
-from truespring.reference.vtk import read_vtk_result
+from truespring.reference.vtk import RESULTS, read_vtk_result
 
 
 class Format(NamedTuple):
@@ -53,8 +52,7 @@ READERS: Table[Format] = Table(
         ".dat": Format(
             is_dat, read_dat, frozenset({"mesh"}), unnoticed="truncated after a table it reads as a run that stopped"
         ),
-        **{suffix: Format(recognises, read_vtk_result, _FIELD) for suffix, recognises in VTK_FORMATS.items()},
-        ".pvd": Format(is_vtk_xml("Collection"), read_vtk_result, _FIELD),
+        **{suffix: Format(recognises, read_vtk_result, _FIELD) for suffix, recognises in RESULTS.items()},
         ".rst": Format(is_rst, read_rst),
         ".csv": Format(  # any table
             lambda head: False,
@@ -105,8 +103,8 @@ def read_result(
     """Read a result of another program as a solution, for comparison with others.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
-            table of markers, or a .stl file with the body at rest.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, .vtkhdf, ...), a .rst file of Ansys, a
+            .csv table of markers, or a .stl file with the body at rest.
         unit: the file's unit of length, such as "mm".
         axes: axes of the file along x, y and z of the study: with ("x", "z", "-y") the study's y is the file's z, and
             the study's z is the file's -y.
@@ -135,8 +133,8 @@ def read_record(
     """Read a result of another program as a record; its format is found by content, else by suffix.
 
     Args:
-        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, ...), a .rst file of Ansys, a .csv
-            table of markers or a .stl file.
+        file: a .frd or .dat file of CalculiX, a file of VTK's (.vtu, .vtk, .pvd, .vtkhdf, ...), a .rst file of Ansys, a
+            .csv table of markers or a .stl file.
         field: name of the displacement, for VTK files.
         undeformed: file with the undeformed state, for tables of markers and STL files.
         mesh: deck with nodes and elements, for .dat files.

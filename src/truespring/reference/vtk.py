@@ -1,7 +1,8 @@
-"""Read results in VTK files: grids and surfaces of all formats, in one or several pieces, and .pvd series."""
+"""Read results in VTK files: grids and surfaces of all formats, in pieces, and series of .pvd and .vtkhdf files."""
 
 import itertools
 import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,11 +21,13 @@ from truespring.reference.checks import checked, refuse_unreadable
 from truespring.reference.components import DISPLACEMENTS, components
 from truespring.reference.record import Level, Reading, Record
 from truespring.reference.vtk_cells import named, refuse_unknown
+from truespring.reference.vtkhdf import TimedGrid, is_hdf5, read_vtkhdf
 
 # Scalars of these names are the components of a displacement, as Elmer writes them.
 _ALONE = "uvw"
 
-_KINDS = {**VTK_FORMATS, ".pvd": is_vtk_xml("Collection")}
+#: Formats of results that `read_vtk_result` reads, by suffix.
+RESULTS = {**VTK_FORMATS, ".pvd": is_vtk_xml("Collection"), ".vtkhdf": is_hdf5}
 
 
 class _Part(NamedTuple):
@@ -36,7 +39,7 @@ class _Part(NamedTuple):
 
 
 def read_vtk_result(file: Path, reading: Reading | None = None, field: str | None = None) -> Record:
-    """Read the displacement in a VTK file, one level of time 1, or in the series of a .pvd file.
+    """Read the displacement in a VTK file, one level of time 1, or in the series of a .pvd or .vtkhdf file.
 
     Points must be at their undeformed positions. The cell array `strain_energy` [J] of finite elements written by
     truespring is summed to the energy of the level; in files of other programs it may be a density, and that of springs
@@ -44,42 +47,56 @@ def read_vtk_result(file: Path, reading: Reading | None = None, field: str | Non
 
     Args:
         file: the result.
-        reading: called with the fraction that has been read, after each file of a series.
+        reading: called with the fraction that has been read, after each level of a series.
         field: name of the displacement among the point arrays; by default the only one called displacement,
             displacements, u, disp or deformation in upper or lower case, else scalars by such a name and an axis
             ("displacement 1", "disp:0", "u_x"), or u, v and w.
 
     Returns a record whose kind is the file's suffix. Raises ReferenceFileError if a file is damaged, the displacement
-    is not found, or points or cells differ between files of a series.
+    is not found, or points or cells differ between the levels of a series.
     """
     refuse_unreadable(file)
     kind = _kind(file)
-    parts, notes = _series(file) if kind == "pvd" else ([_Part(1.0, "", file)], [])
+    notes: list[str] = []
+    if kind == "vtkhdf":
+        timed = read_vtkhdf(file)
+    elif kind == "pvd":
+        parts, notes = _series(file)
+        timed = _grids(parts)
+    else:
+        timed = _grids([_Part(1.0, "", file)])
     first: Record | None = None
     levels: list[Level] = []
+    for one in timed:
+        displacement, remarks = _displacement(one.grid, field, one.file)
+        cells = _cells(one.grid, one.file)
+        level = Level(one.time, displacement, _energy(one.grid))
+        record = Record(one.file, kind, one.grid.points, cells, (level,))
+        first = first or record
+        _refuse_other_mesh(record, first)
+        levels.append(level)
+        notes += [note for note in (*one.grid.notes, *remarks) if note not in notes]
+        if reading:
+            reading(one.share)
+    if first is None:
+        raise ReferenceFileError(f"{file} has no steps")
+    return checked(Record(file, kind, first.points, first.cells, tuple(levels), notes=tuple(notes)))
+
+
+def _grids(parts: Sequence[_Part]) -> Iterator[TimedGrid]:
+    """Yield the grid of each time, of one or several files."""
     n_read = 0
     for time, members in itertools.groupby(parts, lambda part: part.time):
         files = [part.file for part in members]
-        grid = one_grid([_grid(one) for one in files])
-        displacement, remarks = _displacement(grid, field, files[0])
-        cells = _cells(grid, files[0])
-        record = Record(files[0], kind, grid.points, cells, (Level(time, displacement, _energy(grid)),))
-        first = first or record
-        _refuse_other_mesh(record, first)
-        levels += record.levels
-        notes += [note for note in (*grid.notes, *remarks) if note not in notes]
         n_read += len(files)
-        if reading:
-            reading(n_read / len(parts))
-    assert first is not None  # _series holds one at least
-    return checked(Record(file, kind, first.points, first.cells, tuple(levels), notes=tuple(notes)))
+        yield TimedGrid(time, one_grid([_grid(one) for one in files]), files[0], n_read / len(parts))
 
 
 def _kind(file: Path) -> str:
     """Return the format of a file, such as "vtu": by its content, else by its suffix."""
     with open_file(file, ReferenceFileError) as stream:
         head = stream.read(HEAD)
-    return (format_by_head(file.suffix, head, _KINDS) or ".vtu").lstrip(".")
+    return (format_by_head(file.suffix, head, RESULTS) or ".vtu").lstrip(".")
 
 
 def _series(file: Path) -> tuple[list[_Part], list[str]]:

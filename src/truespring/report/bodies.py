@@ -222,11 +222,14 @@ def distance_figure(result: Result, name: str, comparison: Comparison) -> Sheet 
     return area.sheet
 
 
-def over_title(result: Result, level: float, comparison: Comparison) -> str:
-    """Return a title: the load level, and the distance between the two paths of a comparison."""
+def over_title(result: Result, level: float, comparison: Comparison, number: int = -1) -> str:
+    """Return a title: the load level, and the distance between the two paths of a comparison.
+
+    `number` is that of the level among the levels of the comparison.
+    """
     at = level_name(result, level).capitalize()
-    if comparison.load_factors.size and np.isfinite(comparison.rms_errors[-1]):
-        return f"{at}: {percent(float(comparison.rms_errors[-1]))} apart (root mean square)"
+    if comparison.load_factors.size and np.isfinite(comparison.rms_errors[number]):
+        return f"{at}: {percent(float(comparison.rms_errors[number]))} apart (root mean square)"
     if comparison.surface is not None:
         return f"{at}: outlines {quantity(comparison.surface.outline_rms, 'm', 2)} apart (root mean square)"
     return at

@@ -29,14 +29,14 @@ from truespring.report.shades import draw_shaded_dots
 from truespring.report.sheet import Area
 from truespring.report.style import BLUE, FAINT, INK, LOAD, RED, error_colors, full_name
 from truespring.report.supports3d import clamped_nodes, draw_supports
-from truespring.report.surfaces import edges_of, facets_of, lines_on, normals, outline, seen
+from truespring.report.surfaces import VIEW, edges_of, facets_of, lines_on, normals, outline, seen
 from truespring.report.symbols import Arrow, draw_dot, draw_drive, draw_loaded, draw_outside, find_arrows
 from truespring.report.touching import drawn_tools, entries, near, with_tools
 from truespring.report.undeformed import Undeformed
 from truespring.report.verdict import display_name, level_name
 
-# Colours of surfaces: undeformed body, reference, supports; the light comes from above, left of the viewer.
-_BODY, _REFERENCE, _HELD = "#f7f8f9", "#e6e9ec", "#bcc2c8"
+#: Colours of surfaces: undeformed body, reference, supports; the light comes from above, left of the viewer.
+BODY, REFERENCE, _HELD = "#f7f8f9", "#e6e9ec", "#bcc2c8"
 _LIGHT = np.array([-0.3, 0.6, 0.74]) / np.linalg.norm([-0.3, 0.6, 0.74])
 _DASHES = (0, (3, 2))
 
@@ -47,7 +47,7 @@ def undeformed_picture(body: Undeformed) -> Picture:
     mesh = problem.mesh
     size = float((mesh.upper - mesh.lower).max())
     points, facets = seen(mesh.nodes), facets_of(mesh)
-    arrows = find_arrows(problem, size, lambda places: seen(places)[:, :2])
+    arrows = find_arrows(problem, size, lambda places: seen(places)[:, :2], VIEW[2])
     layers = []
     if len(facets):
         layers.append(solid(points, facets, _tinted(problem, facets, arrows), edges_of(facets), INK, 1.0))
@@ -141,10 +141,10 @@ def over_layers(model: Solution, mine: Floats, reference: Solution | None, their
     if reference is None or theirs is None:
         if not len(facets):
             return (wires(mine, facets, path_lines(model), 0.8),)
-        return (solid(mine, facets, one_color(facets, _BODY), path_lines(model), BLUE, 0.8),)
+        return (solid(mine, facets, one_color(facets, BODY), path_lines(model), BLUE, 0.8),)
     others, lines = facets_of(reference.problem.mesh), path_lines(reference)
     if len(others):
-        black = solid(theirs, others, one_color(others, _REFERENCE), lines, INK, 1.2)
+        black = solid(theirs, others, one_color(others, REFERENCE), lines, INK, 1.2)
     else:
         black = wires(theirs, others, lines, 1.3, INK)
     return black, wires(mine, facets, path_lines(model), 0.8)
@@ -191,7 +191,7 @@ def _dots_picture(result: Result, name: str, comparison: Comparison, pair: _Pair
         if len(facets) and state is not None:
             points = seen(path.problem.mesh.nodes + pair.factor * state.displacement)
             corners.append(points)
-            layers.append(solid(points, facets, one_color(facets, _BODY), edges_of(facets), INK, 0.35))
+            layers.append(solid(points, facets, one_color(facets, BODY), edges_of(facets), INK, 0.35))
     if not layers:
         layers.append(wires(pair.mine, facets_of(comparison.model.problem.mesh), path_lines(comparison.model), 0.6))
     legend = (Entry("undeformed", FAINT, linestyle=_DASHES), Entry("probe", RED, "o", ""))
@@ -285,12 +285,12 @@ def one_color(facets: Ints, color: str) -> Floats:
 def _tinted(problem: Problem, facets: Ints, arrows: Sequence[Arrow]) -> Floats:
     """Return the colours of the undeformed body: darker where it is clamped, tinted where arrows act."""
     mesh = problem.mesh
-    colors = one_color(facets, _BODY).copy()
+    colors = one_color(facets, BODY).copy()
     clamped = clamped_nodes(problem)[facets].all(axis=1)
     colors[clamped] = one_color(facets[clamped], _HELD)
     for arrow in arrows:
         acted = _within(facets, arrow.nodes, mesh.n_nodes)
-        colors[acted] = 0.7 * one_color(facets[acted], _BODY) + 0.3 * one_color(facets[acted], arrow.color)
+        colors[acted] = 0.7 * one_color(facets[acted], BODY) + 0.3 * one_color(facets[acted], arrow.color)
     return colors
 
 

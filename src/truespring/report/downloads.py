@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -53,7 +53,7 @@ def films_in(folder: Path) -> Films:
 
 
 def downloads(result: Result, films: Films) -> list[Download]:
-    """Return the tables of a result, as its output folder has them, and its animation."""
+    """Return the tables of a result, as its output folder has them, and its animation unless the page shows it."""
     with TemporaryDirectory(prefix="truespring-") as place:
         folder = Path(place)
         write_curves(result, folder / "curves.csv")
@@ -61,7 +61,18 @@ def downloads(result: Result, films: Films) -> list[Download]:
         if moved_supports(result.problem):
             write_reactions(result, folder / "reactions.csv")
         tables = {file.name: file.read_bytes() for file in sorted(folder.iterdir())}
-    return [_download(result, name, content) for name, content in {**tables, **films}.items()]
+    several = [_download(f"{result.stem}_{name}", content, _CONTENTS[name]) for name, content in tables.items()]
+    shown = () if moving_picture(result, films) is None else ("animation.gif",)  # saved by its button
+    for name, content in films.items():
+        if name not in shown:
+            one = _download(f"{result.stem}_{name}", content, _CONTENTS[name])
+            several.append(one if one.address else replace(one, name=name))
+    return several
+
+
+def table_download(name: str, text: str, contents: str) -> Download:
+    """Return a CSV file; `contents` says what it holds."""
+    return _download(name, text.encode(), contents)
 
 
 def moving_picture(result: Result, films: Films) -> dict[str, str] | None:
@@ -73,11 +84,10 @@ def moving_picture(result: Result, films: Films) -> dict[str, str] | None:
     return {"address": _address("animation.gif", gif), "title": title, "width": "", "name": f"{result.stem}_animation"}
 
 
-def _download(result: Result, name: str, content: bytes) -> Download:
+def _download(name: str, content: bytes, contents: str) -> Download:
     most = _LARGEST_TABLE if name.endswith(".csv") else _LARGEST_FILM
-    shown = len(content) <= most and name != "animation.gif"  # that one is the picture
-    address = _address(name, content) if shown else ""
-    return Download(f"{result.stem}_{name}" if address else name, address, _size(len(content)), _CONTENTS[name])
+    address = _address(name, content) if len(content) <= most else ""
+    return Download(name, address, _size(len(content)), contents)
 
 
 def _address(name: str, content: bytes) -> str:

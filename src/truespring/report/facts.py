@@ -3,7 +3,7 @@
 import numpy as np
 
 from truespring.material import Material
-from truespring.mesh import Box, select_elements
+from truespring.mesh import Box, Mesh, select_elements
 from truespring.problem import Problem, Region
 from truespring.report.axis import history_words
 from truespring.report.quantity import input_quantity
@@ -14,12 +14,17 @@ _ROUNDING = 1e-12
 
 
 def facts(result: Result) -> list[tuple[str, str]]:
-    """Return name and text of the data of a study: body, mesh, material, loads, probe."""
-    problem = result.problem
+    """Return name and text of the data of a study: those of its problem, finite elements, probe."""
+    at = ", ".join(input_quantity(float(f"{value:.4g}"), "m") for value in result.problem.mesh.nodes[result.probe])
+    probe = ("probe", f"node {result.probe} at ({at}), the red dot")
+    return [*problem_facts(result.problem), *_element_facts(result), probe]
+
+
+def problem_facts(problem: Problem) -> list[tuple[str, str]]:
+    """Return name and text of the data of a problem: body, mesh, material, section, supports, loads, motion."""
     mesh = problem.mesh
-    size = " × ".join(input_quantity(float(f"{extent:.4g}"), "m") for extent in mesh.upper - mesh.lower)
     found = [
-        ("body", size),
+        ("body", size_words(mesh)),
         ("mesh", f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements ({mesh.kinds})"),
     ]
     if problem.material is not None:
@@ -28,11 +33,12 @@ def facts(result: Result) -> list[tuple[str, str]]:
     if problem.section is not None and problem.section.key:
         found.append(("section", f"{problem.section.words}, {input_quantity(problem.section.thickness, 'm')} thick"))
     found += _drive_facts(problem)
-    found += [("motion", problem.dynamics.words())] if problem.dynamics is not None else []
-    found += _element_facts(result)
-    at = ", ".join(input_quantity(float(f"{value:.4g}"), "m") for value in mesh.nodes[result.probe])
-    found.append(("probe", f"node {result.probe} at ({at}), the red dot"))
-    return found
+    return found + ([("motion", problem.dynamics.words())] if problem.dynamics is not None else [])
+
+
+def size_words(mesh: Mesh) -> str:
+    """Return the size of a mesh along the axes, with units."""
+    return " × ".join(input_quantity(float(f"{extent:.4g}"), "m") for extent in mesh.upper - mesh.lower)
 
 
 def _element_facts(result: Result) -> list[tuple[str, str]]:

@@ -12,12 +12,13 @@ from truespring.report.bodies import distance_figure, over_figure, undeformed_fi
 from truespring.report.bodies3d import distance_picture, over_picture, undeformed_picture
 from truespring.report.drawing import Drawing, drawing_of, save_drawings
 from truespring.report.frame3d import figure_of, shot
-from truespring.report.plots import curves_figure, error_figure, has_reactions, moduli_figure, reactions_figure
+from truespring.report.plots import curves_figure, error_figure, moduli_figure
 from truespring.report.reel import INSTANTS, Reel, reel_of, sheet_of, shots, shown_reference
 from truespring.report.render import Image, render
 from truespring.report.result import Result
 from truespring.report.sheet import Sheet
 from truespring.report.style import figure_style
+from truespring.report.support_curves import support_figures
 from truespring.report.timelines import energies_figure, has_touches, moving, tools_figure
 from truespring.report.undeformed import Undeformed, undeformed_of
 
@@ -91,8 +92,8 @@ def _draw(result: Result) -> Iterator[_Named]:
     bodies = _bodies_in_space(result) if result.problem.mesh.dim == 3 else lambda: _plane_bodies(result)
     if any(len(path.states) > 1 for path in result.paths.values()):
         yield "curves", curves_figure(result), ""
-        if has_reactions(result):
-            yield "reactions", reactions_figure(result), ""
+        for name, sheet in support_figures(result):
+            yield name, sheet, ""
     yield from _histories(result)
     if any(one.load_factors.size for one in result.comparisons.values()):
         yield "error", error_figure(result), ""

@@ -84,6 +84,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
     return {
         "id": f"study-{place}",
         "title": result.title,
+        "stem": result.stem,
         "verdict": verdict_sentences(result),
         "more": [text for sentence in _SENTENCES if (text := sentence(result))],
         "converged": result.converged,
@@ -104,7 +105,13 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "over": [pictures[drawn] for name in result.comparisons for drawn in _over(result, name, pictures)],
         "films": [pictures[drawn] for drawn in _films(result) if drawn in pictures],
         "parts": part_rows(result),
-        "histories": ["curves", "reactions", "tools", *map(energies_name, result.paths), "error"],
+        "histories": [
+            "curves",
+            *(name for name in pictures if name.startswith("reactions")),
+            "tools",
+            *map(energies_name, result.paths),
+            "error",
+        ],
         "viewer": moving,
         "model": result.model,
         "axis": axis_of(result),
@@ -130,6 +137,11 @@ def _over(result: Result, name: str, pictures: Mapping[str, Any]) -> list[str]:
     """Return the name of the picture of the model over a reference; the one coloured by distance if there is one."""
     both = (distance_name(result, name), over_name(result, name))
     return [drawn for drawn in both if drawn in pictures][:1]
+
+
+def _reactions(pictures: Mapping[str, Any]) -> list[str]:
+    """Return the names of the curves of moved supports."""
+    return [name for name in pictures if name.startswith("reactions")]
 
 
 def _films(result: Result) -> Iterator[str]:
@@ -246,7 +258,7 @@ def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
         "fit": result.fitness[name].fit if name in result.fitness else None,
         "judged": result.fitness[name].sentence if name in result.fitness else "",
         "material": material_name(result) + (", outside its regions" if result.problem.regions else ""),
-        "rows": _moduli_rows(moduli),
+        "rows": moduli_rows(moduli),
         "elements": linear_fem(path).removeprefix("linear "),
         "bending": [
             (
@@ -260,7 +272,7 @@ def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
     }
 
 
-def _moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
+def moduli_rows(moduli: Moduli) -> list[tuple[str, str, str]]:
     """Return name, effective value of the springs and value of the material of each modulus."""
     plane = moduli.dim == 2
     youngs = [("along x", moduli.young()), *([("at 45°", moduli.young(45))] if plane else [])]

@@ -9,7 +9,7 @@ import numpy as np
 
 from truespring.arrays import Bools, Floats, Ints
 from truespring.equilibrium import Solution, State
-from truespring.reactions import SupportForce, leading_support, moved_supports
+from truespring.reactions import SupportForce, leading_support
 from truespring.report.axis import axis_of, driven_by_motion
 from truespring.report.frame import EDGE, draw_frame
 from truespring.report.quantity import natural_scale, tolerance_percent
@@ -91,58 +91,6 @@ def _of_leading(path: Solution, state: State) -> SupportForce | None:
     """Return force and torque of the support that moves most; None if unknown."""
     number = leading_support(path.problem) if path.problem.stated else None
     return next((one for one in path.support_forces(state) if one.support == number), None)
-
-
-def has_reactions(result: Result) -> bool:
-    """Return whether forces of moved supports have a figure: if loads act too, or a support is rotated."""
-    problem = result.problem
-    moved = moved_supports(problem)
-    if not any(path.support_forces(state) for path in result.paths.values() for state in path.states[:1]):
-        return False
-    return not problem.loading.driven_by_motion or any(problem.held[number].turn is not None for number in moved)
-
-
-def reactions_figure(result: Result) -> Sheet:
-    """Return force against displacement of the support that moves most, or torque against angle if it only rotates."""
-    number = leading_support(result.problem)
-    assert number is not None  # has_reactions
-    held = result.problem.held[number]
-    turned = held.turn is not None and not held.motion.any()
-    styles = path_styles(result)
-    forces, moves = {}, {}
-    for name, path in result.paths.items():
-        both = [(state, _of_leading(path, state)) for state in path.states]
-        known = [(state, one) for state, one in both if one is not None]
-        if not known:
-            continue
-        factors = np.array([state.load_factor for state, _ in known])
-        if turned and held.turn is not None:
-            axis = held.turn.axis if result.problem.mesh.dim == 3 else np.ones(1)
-            forces[name] = np.array([float(one.torque @ axis) for _, one in known])
-            moves[name] = factors * np.degrees(held.turn.angle)
-        else:
-            way = held.motion / np.linalg.norm(held.motion)
-            forces[name] = np.array([float(one.force @ way) for _, one in known])
-            moves[name] = factors * np.linalg.norm(held.motion)
-    unit, letter = ("N m", "torque") if turned else ("N", "force")
-    x_scale = natural_scale(max(float(np.abs(values).max()) for values in forces.values()), unit)
-    y_scale = natural_scale(max(float(np.abs(values).max()) for values in moves.values()), "m")
-    size, name_of_y = (
-        (1.0, "rotation [degrees]") if turned else (y_scale.size, f"displacement of the support [{y_scale.unit}]")
-    )
-    curves = [
-        Curve(
-            forces[name] / x_scale.size,
-            moves[name] / size,
-            *styles[name],
-            label=_two_lines(result, name),
-            strong=is_strong(result, name),
-        )
-        for name in forces
-    ]
-    several = len(moved_supports(result.problem)) > 1
-    title = f"{letter.capitalize()} of {f'support {number + 1}' if several else 'the moved support'}"
-    return plot(title, f"{letter} of the support [{x_scale.unit}]", name_of_y, curves).sheet
 
 
 def error_figure(result: Result) -> Sheet:

@@ -11,6 +11,7 @@ from truespring.equilibrium import FINE, Solution
 from truespring.models import Fitness
 from truespring.problem import Problem
 from truespring.refining import Standing
+from truespring.report.series import Form
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,22 @@ def head_note(source: str) -> str:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """The solutions and comparisons of one study.
+    """The solutions and comparisons of one study, as `ts.verify` returns them.
+
+    >>> import truespring as ts
+    >>> problem = ts.Problem(
+    ...     mesh=ts.rectangle(size=(0.04, 0.01), elements=(4, 1)),
+    ...     material=ts.Material(young=10e3, poisson=0.3),
+    ...     section=ts.PlaneStress(thickness=0.01),
+    ...     supports=[ts.Fixed(on="left")],
+    ...     loads=[ts.Force(on="right", total=(0.1, 0.0))],
+    ... )
+    >>> models = {"springs": ts.Springs(rule="gaussian"), "fem": ts.Fem(law="neo-hookean")}
+    >>> result = ts.verify(problem, models=models)
+    >>> list(result.solutions), list(result.comparisons), result.converged
+    (['springs', 'fem'], ['fem'], True)
+    >>> result.verdict
+    'Up to full load springs stay within 5 % of neo-Hookean FEM. ...'
 
     Attributes:
         title: title of the study.
@@ -55,6 +71,7 @@ class Result:
         splits: errors of the time step and of the solver in a motion of the model; None at rest, or if not known.
         in_detail: whether distances of surfaces [m] and energies are reported too, and plane bodies coloured by
             distance, as in comparisons of two results.
+        form: form of the files of the levels.
     """
 
     title: str
@@ -70,9 +87,16 @@ class Result:
     standings: Mapping[str, Standing] = field(default_factory=dict)
     splits: MotionErrors | None = None
     in_detail: bool = False
+    form: Form = "vtu"
 
     def __repr__(self) -> str:
         return f"Result({self.stem}, {list(self.paths.values())})"
+
+    def _repr_html_(self) -> str:
+        """Return the result as HTML for a notebook: a table and a picture."""
+        from truespring.showing.values import html_of
+
+        return html_of(self)
 
     @property
     def stem(self) -> str:
@@ -88,6 +112,32 @@ class Result:
     def closest(self) -> str | None:
         """Name of the reference nearest to the model at full load."""
         return closest(self.comparisons)
+
+    @property
+    def solutions(self) -> Mapping[str, Solution]:
+        """The solution of each model, by its name: `paths`."""
+        return self.paths
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """The comparison with the reference nearest to the model at full load; None if nothing is compared."""
+        return None if self.closest is None else self.comparisons[self.closest]
+
+    @property
+    def verdict(self) -> str:
+        """How far the model may be trusted, in sentences: trouble, agreement with the references, separate errors."""
+        from truespring.showing.results import verdict_of
+
+        return verdict_of(self)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the report as one HTML file that needs no network; return its path.
+
+        Raises OutputError if it cannot be written.
+        """
+        from truespring.showing.results import write_report
+
+        return write_report(self, Path(path))
 
     @property
     def converged(self) -> bool:

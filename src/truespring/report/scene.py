@@ -1,30 +1,35 @@
 """Data of the interactive 3D view beyond those of the 2D view: surface, inner springs, distances as colours."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from truespring.arrays import Ints
+from truespring.arrays import Floats, Ints
 from truespring.equilibrium import Solution, State
-from truespring.mesh import Mesh
+from truespring.errors import MeshError
+from truespring.mesh import Mesh, in_simplices
 from truespring.mesh.facets import triangles_of
 from truespring.report.bodies import path_lines
+from truespring.report.nodal import FIELDS, node_fields
 from truespring.report.packing import Packing
-from truespring.report.quantity import ROUNDING, quantity
+from truespring.report.quantity import ROUNDING, natural_scale, quantity
 from truespring.report.result import Result
 from truespring.report.style import error_colors
 from truespring.report.surfaces import edges_of, facets_of, lines_on, outline
 from truespring.report.undeformed import spring_lines
 
-# With more springs than this, only those on the surface are drawn.
-_MOST_SPRINGS = 20_000
+# With more springs than this, only those on the surface are drawn; with more nodes, a body that is cut is hollow.
+_MOST_SPRINGS, _MOST_SOLID = 20_000, 3_000
+# Steps of the range of a quantity, and with more values than the last number.
+_FINE, _COARSE, _MANY = 65535, 255, 100_000
 
 
 def scene_nodes(result: Result, shown: Sequence[str]) -> Ints:
     """Return the nodes that a view of the paths `shown` draws, ascending, shape (n,): surface, lines, probe."""
     kept = np.zeros(result.problem.mesh.n_nodes, dtype=bool)
     kept[facets_of(result.problem.mesh)] = True
+    kept |= result.problem.mesh.n_nodes <= _MOST_SOLID
     kept[result.probe] = True
     for name in shown:
         for lines in _lines(result.paths[name]):
@@ -54,7 +59,54 @@ def surface_in_scene(mesh: Mesh, pack: Packing) -> dict[str, Any]:
         "triangles": pack.pairs(triangles_of(facets)),
         "edges": pack.pairs(edges_of(facets)),
         "colors": colors.tolist(),
+        "tetrahedra": pack.cells(_tetrahedra(mesh)) if len(pack.nodes) == mesh.n_nodes else "",
     }
+
+
+def _tetrahedra(mesh: Mesh) -> Ints:
+    """Return the elements of a solid body divided into tetrahedra, shape (n, 4); none if they cannot be divided."""
+    none = np.zeros((0, 4), dtype=np.int64)
+    if mesh.element_dim < 3:
+        return none
+    try:
+        return in_simplices(mesh)[0].elements
+    except MeshError:
+        return none
+
+
+def fields_in_scene(
+    result: Result, shown: Sequence[str], levels: Sequence[float], pack: Packing
+) -> tuple[list[dict[str, Any]], list[dict[str, list[str]]]]:
+    """Return the quantities that colours may stand for, and the values of each path of `shown` at each level.
+
+    A quantity has its name, words and unit, and the range of all paths and levels in that unit; the values of a path
+    are steps in that range, by the name of the quantity.
+    """
+    known = [
+        [node_fields(path, state) for level in levels if (state := path.at(level)) is not None]
+        for path in map(result.paths.__getitem__, shown)
+    ]
+    fields, values = [], [dict[str, list[str]]() for _ in shown]
+    steps = _FINE if len(FIELDS) * len(shown) * len(levels) * len(pack.nodes) <= _MANY else _COARSE
+    for name, field in FIELDS.items():
+        those = [
+            (place, [one[name] for one in several]) for place, several in enumerate(known) if _all_have(several, name)
+        ]
+        found = [value for _, several in those for one in several for value in one[pack.nodes]]
+        low, high = min(found, default=field.at_rest), max(found, default=field.at_rest)
+        low = field.at_rest if low > field.at_rest - ROUNDING * abs(high) else low
+        if not high - low > ROUNDING * abs(high):
+            continue
+        scale = natural_scale(high, field.unit)
+        ends = {"low": low / scale.size, "high": high / scale.size}
+        fields.append({"name": name, "label": field.label, "unit": scale.unit, "steps": steps, **ends})
+        for place, several in those:
+            values[place][name] = [pack.shares(one, low, high, steps) for one in several]
+    return fields, values
+
+
+def _all_have(several: Sequence[Mapping[str, Floats]], name: str) -> bool:
+    return bool(several) and all(name in one for one in several)
 
 
 def path_in_scene(result: Result, name: str, states: Sequence[State], pack: Packing, factor: float) -> dict[str, Any]:

@@ -16,6 +16,17 @@ INK, BLUE, RED, LOAD, MOTION, FAINT = "#16191d", "#0072b2", "#d3222a", "#b84a00"
 _ERROR_RANGE = (0.97, 0.27)
 
 SPRING_STYLES = ((BLUE, "-", "o"), ("#3a9bdc", "--", "s"), ("#00476f", "-.", "^"), ("#5c7fb8", ":", "D"))
+#: Colour, dashes and marker of lines that are all alike, such as values of many models.
+EQUAL_STYLES: tuple[tuple[str, Any, str], ...] = (
+    (BLUE, "-", "o"),
+    ("#000000", (0, (6, 2)), "s"),
+    (LOAD, (0, (3, 1.5, 1, 1.5)), "^"),
+    (MOTION, (0, (1.2, 1.6)), "D"),
+    ("#7a4f9c", "-", "v"),
+    ("#3a9bdc", (0, (6, 2)), "P"),
+    ("#70777e", (0, (3, 1.5, 1, 1.5)), "X"),
+    ("#8a5a00", (0, (1.2, 1.6)), "<"),
+)
 _REFERENCE_STYLES = (
     ("#000000", (0, ()), "s"),
     ("#3d4248", (0, (6, 2)), "^"),

@@ -1,13 +1,13 @@
 """Marks on a picture of a body: the probe, arrows of loads and prescribed motions, pins and rollers of supports."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.loading import Mark
+from truespring.loading import Along, Mark
 from truespring.problem import Problem
 from truespring.report.lines import draw_arrow
 from truespring.report.quantity import Scale, input_quantity
@@ -49,7 +49,8 @@ class Arrow:
         side: 1 if the text is on the right, -1 if on the left.
         room: the far end of the text [m], shape (2,).
         nodes: the nodes it acts on.
-        text, color: of the label.
+        text, color: of the label; one of several arrows has no text.
+        slim: whether it is one of several.
     """
 
     ends: tuple[Floats, Floats]
@@ -58,15 +59,17 @@ class Arrow:
     nodes: Ints
     text: str
     color: str
+    slim: bool = False
 
 
 class Acting(NamedTuple):
-    """A load or a prescribed motion: the nodes it acts on, its direction, its text and its colour."""
+    """A load or a prescribed motion: the nodes it acts on, its direction, text and colour, and where it is facets."""
 
     nodes: Ints
     vector: Floats
     text: str
     color: str
+    along: Along | None = None
 
 
 def find_acting(problem: Problem) -> Iterator[Acting]:
@@ -80,32 +83,75 @@ def find_acting(problem: Problem) -> Iterator[Acting]:
 
 def _acting(mark: Mark, color: str) -> Acting:
     text = f"{mark.symbol} = {input_quantity(float(f'{mark.size:.4g}'), mark.unit)}"
-    return Acting(mark.nodes, mark.vector, text, color)
+    return Acting(mark.nodes, mark.vector, text, color, mark.along)
 
 
-def find_arrows(problem: Problem, size: float, view: View = plane_view) -> list[Arrow]:
-    """Return the arrows of all loads and motions of a body that is about `size` [m] large."""
-    mesh = problem.mesh
-    middle = (mesh.lower + mesh.upper) / 2
+def find_arrows(problem: Problem, size: float, view: View = plane_view, towards: Floats | None = None) -> list[Arrow]:
+    """Return the arrows of all loads and motions of a body that is about `size` [m] large.
+
+    A load that is spread has several, on facets that face the eye; `towards` is the direction to it, None in the plane.
+    """
+    middle = (problem.mesh.lower + problem.mesh.upper) / 2
     found = []
-    for nodes, vector, text, color in find_acting(problem):
-        if not vector.any():
-            continue
-        direction = vector / np.linalg.norm(vector)
-        centre = mesh.nodes[nodes].mean(axis=0)
-        outward = centre - middle
-        along = float(direction @ outward)
-        length = 0.13 * size * direction
-        gap = 0.025 * size
-        if abs(along) > 0.5 * float(np.linalg.norm(outward)) > 0:  # mainly normal to the face: outside of it
-            tail = centre + gap * direction if along > 0 else centre - gap * direction - length
-        else:  # mainly tangential: along the face
-            beside = outward / max(float(np.linalg.norm(outward)), 1e-300)
-            tail = centre + 2 * gap * beside - length / 2
-        start, end, seen, seen_middle = view(np.stack([tail, tail + length, centre, middle]))
-        side = 1 if seen[0] + 1e-9 * size >= seen_middle[0] else -1
-        near = start if (side > 0) == (end[0] >= start[0]) else end
-        found.append(Arrow((start, end), side, near + np.array([side * 0.24 * size, 0.0]), nodes, text, color))
+    for acting in find_acting(problem):
+        chosen = None if acting.along is None else _chosen(acting.along, size, towards)
+        if chosen is not None:
+            found += _several(acting, chosen, size, view, middle)
+        elif acting.vector.any():
+            centre = problem.mesh.nodes[acting.nodes].mean(axis=0)
+            found.append(_arrow(acting, centre, centre - middle, size, view, middle))
+    return found
+
+
+def _arrow(acting: Acting, centre: Floats, outward: Floats, size: float, view: View, middle: Floats) -> Arrow:
+    """Return an arrow at a point of the body [m] whose side looks `outward`."""
+    direction = acting.vector / np.linalg.norm(acting.vector)
+    along = float(direction @ outward)
+    length = (_LENGTH if acting.text else _SHORT) * size * direction
+    gap = 0.025 * size * bool(acting.text)
+    if abs(along) > 0.5 * float(np.linalg.norm(outward)) > 0:  # mainly normal to the face: outside of it
+        tail = centre + gap * direction if along > 0 else centre - gap * direction - length
+    else:  # mainly tangential: along the face
+        beside = outward / max(float(np.linalg.norm(outward)), 1e-300)
+        tail = centre + 2 * gap * beside - length / 2
+    start, end, seen, seen_middle = view(np.stack([tail, tail + length, centre, middle]))
+    side = 1 if seen[0] + 1e-9 * size >= seen_middle[0] else -1
+    near = start if (side > 0) == (end[0] >= start[0]) else end
+    return Arrow(
+        (start, end), side, near + np.array([side * 0.24 * size, 0.0]), acting.nodes, acting.text, acting.color
+    )
+
+
+# Length of an arrow, and of one of several; smallest distance of several [sizes of the body], and their number.
+_LENGTH, _SHORT, _APART, _MOST = 0.13, 0.08, 0.055, 16
+
+
+def _chosen(facets: Along, size: float, towards: Floats | None) -> Ints | None:
+    """Return the facets to draw arrows on, far from each other; None if none faces the eye."""
+    facing = np.arange(len(facets.centres)) if towards is None else np.flatnonzero(facets.outward @ towards > 0.05)
+    if not facing.size:
+        return None
+    centres = facets.centres[facing]
+    chosen = [int(np.linalg.norm(centres - centres.mean(axis=0), axis=1).argmax())]
+    away = np.linalg.norm(centres - centres[chosen[0]], axis=1)
+    while len(chosen) < _MOST and away.max() > _APART * size:
+        chosen.append(int(away.argmax()))
+        away = np.minimum(away, np.linalg.norm(centres - centres[chosen[-1]], axis=1))
+    return np.asarray(facing[np.sort(chosen)])
+
+
+def _several(acting: Acting, chosen: Ints, size: float, view: View, middle: Floats) -> list[Arrow]:
+    """Return an arrow on each facet; that with the text is the outermost to the right or, without one, above."""
+    assert acting.along is not None  # find_arrows
+    centres, outward, forces = (one[chosen] for one in acting.along)
+    seen = view(centres)
+    last = int((seen[:, 0] + 0.5 * seen[:, 1]).argmax())
+    found = []
+    for number, (centre, normal, force) in enumerate(zip(centres, outward, forces, strict=True)):
+        one = acting._replace(vector=force, text="", nodes=acting.nodes if number == last else acting.nodes[:0])
+        arrow = _arrow(one, centre, normal, size, view, middle)
+        more: dict[str, Any] = {"text": acting.text} if number == last else {"room": arrow.ends[0]}
+        found.append(replace(arrow, slim=True, **more))
     return found
 
 
@@ -113,7 +159,9 @@ def draw_drive(area: Area, arrow: Arrow, scale: Scale) -> None:
     """Draw an arrow with its text."""
     tail, tip = area.place(np.stack(arrow.ends) / scale.size)
     (x, y), (to_x, to_y) = tail, tip
-    draw_arrow(area.sheet, tail, tip, arrow.color, 1.8, 4.2)
+    draw_arrow(area.sheet, tail, tip, arrow.color, *((1.2, 3.4) if arrow.slim else (1.8, 4.2)))
+    if not arrow.text:
+        return
     upright = abs(to_y - y) > abs(to_x - x)
     beside, align = (min(x, to_x), 0.0) if arrow.side > 0 else (max(x, to_x), 1.0)
     beside, above = beside + 7 * POINT * arrow.side, (y + to_y) / 2 + (0 if upright else 11 * POINT)

@@ -8,6 +8,8 @@
   // x, y[, z], x, y[, z], ... in 0 ... 65535 of the box, or beyond it
   const places = (text, beyond) => new (beyond ? Float32Array : Uint16Array)(bytes(text));
   const pairs = (text) => new Uint32Array(bytes(text || "")); // from, to, from, to, ...
+  const steps = (text, most) => new (most < 256 ? Uint8Array : Uint16Array)(bytes(text));
+  const few = (text, n_nodes) => new (n_nodes < 65536 ? Uint16Array : Uint32Array)(bytes(text || ""));
 
   for (const host of document.querySelectorAll("[data-viewer]")) {
     const data = JSON.parse(document.getElementById(host.dataset.viewer).textContent);
@@ -21,6 +23,7 @@
       lines: pairs(path.lines),
       inside: pairs(path.inside),
       positions: path.positions.map((text) => places(text, path.beyond)),
+      fields: Object.fromEntries(Object.entries(path.fields || {}).map(([name, texts]) => [name, texts.map((text) => steps(text, data.fields.find((field) => field.name === name).steps))])),
       surface: path.surface && {
         ...path.surface, points: places(path.surface.points, path.beyond), lines: pairs(path.surface.lines),
       },
@@ -30,14 +33,15 @@
     }));
     return {
       ...data, paths, tools, rest: places(data.rest), outline: pairs(data.outline),
-      triangles: pairs(data.triangles), edges: pairs(data.edges),
+      triangles: pairs(data.triangles), edges: pairs(data.edges), tetrahedra: few(data.tetrahedra, data.n_nodes), numbers: pairs(data.numbers),
     };
   }
 
   function start(host, data) {
-    const canvas = host.querySelector("canvas"), slider = host.querySelector("input[type=range]");
-    const play = host.querySelector("button"), boxes = [...host.querySelectorAll("input[type=checkbox]")];
-    const readout = host.querySelector("output");
+    const canvas = host.querySelector("canvas"), slider = host.querySelector("input[name=level]");
+    const play = host.querySelector("button.play"), boxes = [...host.querySelectorAll("input[type=checkbox]")];
+    const readout = host.querySelector("output.state"), color = host.querySelector("select[name=color]");
+    const cut = host.querySelector("select[name=cut]"), cutAt = host.querySelector("input[name=at]");
     const model = data.paths[0], others = data.paths.slice(1), dim = data.box.length;
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const paint = dim === 3 ? window.truespringScene(canvas, data, bar) : plane(canvas, data);
@@ -51,7 +55,10 @@
       choice.addEventListener("change", () => { reference = others[Number(choice.value)]; draw(); });
     }
     slider.addEventListener("input", () => { chosen = true; stop(); draw(); });
-    for (const box of boxes) box.addEventListener("change", () => draw());
+    for (const one of [...boxes, color, cut].filter(Boolean)) one.addEventListener("change", () => draw());
+    if (cutAt) cutAt.addEventListener("input", () => draw());
+    host.querySelector("button.save").addEventListener("click", () => window.truespringPage.saveCanvas(canvas, `${host.dataset.name}.png`));
+    const nodes = readNodes(host, canvas, data, paint, () => draw());
     play.addEventListener("click", () => (playing ? stop() : run()));
     let width = 0, asked = 0;
     new ResizeObserver(([entry]) => { // once per frame, and not for the height that draw() sets
@@ -115,8 +122,15 @@
         level, reference, outline: surface(level), mine: at(model, place), theirs: reference && at(reference, place),
         shifts: data.tools.map((tool) => shift(tool, place)),
         ticked: boxes.filter((box) => box.checked).map((box) => box.name),
+        color: color ? color.value : "", node: nodes.shown(),
+        cut: cut && cut.value ? { axis: Number(cut.value), at: cutAt.value / 1000, other: boxes.some((box) => box.name === "half" && box.checked) } : null,
       };
+      for (const one of host.querySelectorAll("[data-with]")) { // what another choice needs
+        const [name, unlike] = one.dataset.with.split(" "), value = host.querySelector(`select[name=${name}]`).value;
+        one.hidden = !value || value === unlike || (one.dataset.with.startsWith("color") && !reference);
+      }
       paint(shown);
+      nodes.write(shown);
       write(level, reference && reference.beyond && leaves(shown.outline ? shown.outline.points : shown.theirs));
     }
 
@@ -145,11 +159,58 @@
     }
   }
 
+  // Reads nodes: under the pointer, where it was clicked, or one after the other by the keys n and p.
+  function readNodes(host, canvas, data, paint, draw) {
+    const words = host.querySelector("output.node"), unit = Math.max(...data.box) / 65535, dim = data.box.length;
+    let kept = -1, under = -1, pressed = null;
+    const at = (event) => {
+      const box = canvas.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
+    const hover = (node) => { if (node !== under) { under = node; draw(); } };
+    canvas.addEventListener("pointerdown", (event) => { pressed = at(event); });
+    canvas.addEventListener("pointermove", (event) => { if (!event.buttons && event.pointerType === "mouse") hover(paint.pick(at(event))); });
+    canvas.addEventListener("pointerleave", () => hover(-1));
+    canvas.addEventListener("pointerup", (event) => {
+      const [x, y] = at(event);
+      if (!pressed || Math.hypot(x - pressed[0], y - pressed[1]) > 4) return;
+      kept = paint.pick([x, y]);
+      draw();
+    });
+    canvas.addEventListener("keydown", (event) => {
+      const way = { n: 1, p: -1 }[event.key];
+      if (!way && event.key !== "Escape") return;
+      const all = paint.candidates, place = all.indexOf(kept);
+      kept = way ? all[(Math.max(place, way < 0 ? 0 : -1) + way + all.length) % all.length] : -1;
+      draw();
+    });
+    const shown = () => (under >= 0 ? under : kept);
+
+    // A length in the unit of the view, no finer than the data are.
+    const round = (value, step) => +(Math.round(value / step) * step).toPrecision(3);
+    const vector = (values) => `(${values.join(", ")}) ${data.unit}`.replaceAll("-", "−");
+
+    function write({ mine }) {
+      const node = shown(), axes = [...Array(dim).keys()];
+      if (node < 0) { words.textContent = words.dataset.hint; return; }
+      const rest = axes.map((k) => round(data.lower[k] + unit * data.rest[dim * node + k], unit));
+      const moved = axes.map((k) => (unit * (mine[dim * node + k] - data.rest[dim * node + k])) / data.factor);
+      const parts = [
+        `node <b>${data.numbers.length ? data.numbers[node] : node}</b> at rest at ${vector(rest)}`,
+        `displacement <b>${vector(moved.map((value) => round(value, unit / data.factor)))}</b>`,
+        `${round(Math.hypot(...moved), unit / data.factor)} ${data.unit} in all`, ...paint.values(node),
+      ];
+      words.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
+    }
+    return { shown, write };
+  }
+
   // The picture of a plane body; `ticked` shows the distances.
   function plane(canvas, data) {
     const context = canvas.getContext("2d"), model = data.paths[0];
+    let pixels = null; // where the nodes are on the canvas
 
-    return ({ level, reference, outline, mine, theirs, shifts, ticked }) => {
+    const paint = ({ level, reference, outline, mine, theirs, shifts, ticked, node }) => {
       const width = canvas.parentElement.clientWidth, pad = 14, [wide, high] = data.box;
       const scale = Math.min((width - 2 * pad) / wide, Math.max(180, Math.min(460, innerHeight * 0.6)) / high);
       const height = Math.round(scale * high + 2 * pad + 22), dense = devicePixelRatio || 1;
@@ -210,8 +271,21 @@
       context.setLineDash([]);
       if (theirs) dot(theirs, data.probe, 4.5, "#fff", INK);
       dot(mine, data.probe, 4.5, RED, "#fff");
+      if (node >= 0) dot(mine, node, 5.5, "#ffd23f", INK);
       context.restore();
+      pixels = { at: (i) => [x(mine, i), y(mine, i)], theirs, mine, unit: Math.max(wide, high) / 65535 / data.factor };
     };
+    const pick = ([u, v]) => {
+      const away = (i) => Math.hypot(pixels.at(i)[0] - u, pixels.at(i)[1] - v);
+      const nearest = candidates.reduce((best, i) => (away(i) < away(best) ? i : best), 0);
+      return away(nearest) < 14 ? nearest : -1;
+    };
+    const candidates = [...Array(data.n_nodes).keys()];
+    const values = (i) => {
+      const { theirs, mine, unit } = pixels;
+      return theirs ? [`${+(unit * Math.hypot(mine[2 * i] - theirs[2 * i], mine[2 * i + 1] - theirs[2 * i + 1])).toPrecision(2)} ${data.unit} from the reference`] : [];
+    };
+    return Object.assign(paint, { pick, values, candidates });
   }
 
   // A scale bar of a round length; `scale` is pixels per unit.

@@ -13,7 +13,7 @@ from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.packing import Packing
 from truespring.report.quantity import ROUNDING, natural_scale, percent, quantity, times
 from truespring.report.result import Result
-from truespring.report.scene import path_in_scene, scene_nodes, surface_in_scene
+from truespring.report.scene import fields_in_scene, path_in_scene, scene_nodes, surface_in_scene
 from truespring.report.style import full_name
 from truespring.report.surfaces import outline
 from truespring.report.touching import drawn_tools, near, skins_at
@@ -43,13 +43,16 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
     scale = natural_scale(float(extent.max()), "m")
     axis = axis_of(result)
     closest = shown.index(result.closest) - 1 if result.closest in shown else 0
-    values = {
+    values: dict[str, Any] = {
         "magnified": f"displacements {times(factor)}" if factor != 1 else "",
         "motion": result.problem.stated and not result.problem.loads,
         "unit": scale.unit,
         "axis": {"name": axis.name, "unit": axis.unit, "span": axis.span, "level": axis.level, "moves": axis.moves},
         "box": [float(value) for value in extent / scale.size],
         "n_nodes": len(nodes),
+        "lower": [float(value) for value in lower / scale.size],
+        "factor": factor,
+        "numbers": pack.numbers(nodes) if len(nodes) < mesh.n_nodes else "",
         "probe": pack.number(result.probe),
         "chosen": closest,
         "start": _start(result.paths[shown[0]], levels),
@@ -61,7 +64,12 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
         ],
         "tools": _tools(result, levels, pack),
     }
-    return {**values, **surface_in_scene(mesh, pack)} if mesh.dim == 3 else values
+    if mesh.dim == 2:
+        return values
+    fields, of_paths = fields_in_scene(result, shown, levels, pack)
+    for path, own in zip(values["paths"], of_paths, strict=True):
+        path["fields"] = own
+    return {**values, **surface_in_scene(mesh, pack), "fields": fields}
 
 
 def _shown(result: Result) -> list[str]:

@@ -20,7 +20,7 @@ def animate(solution: Solution, file: Path, over: Solution | None) -> Path:
         raise OutputError(f"{file}: MP4 needs imageio-ffmpeg: pip install 'truespring[video]', or write a .gif")
     reel = whole_reel(result_of(solution, over))
     if reel is None:
-        raise OutputError(f"{file}: an animation needs two load levels: {solution.label} has fewer with that level")
+        raise OutputError(f"{file}: an animation needs two load levels or more, {solution.label} has fewer")
     frames = frames_of(reel)
     file.parent.mkdir(parents=True, exist_ok=True)
     if suffix == ".gif":

@@ -24,7 +24,7 @@ class Paint:
         values: shape (n_nodes,), (n_lines,) or (n_elements,); NaN where the quantity is not known.
         lines: node numbers of the lines, shape (n_lines, 2); of values on lines only.
         middle: the value of the middle colour, if larger and smaller values are of different kinds.
-        colors: name of the colours, a key of COLOR_MAPS.
+        colors: name of a colour map of matplotlib, or "distance", the colours of reports.
     """
 
     label: str
@@ -61,19 +61,19 @@ def _distance(solution: Solution, state: State, over: Solution | None) -> Paint:
         raise OutputError(f"the distance from {over.label} is not known at the nodes of {solution.label}")
     apart = np.linalg.norm(mine.displacement - theirs.displacement, axis=1)
     apart[comparison.outside] = np.nan
-    return Paint(f"distance from {over.label}", "m", "nodes", apart, colors="distance")
+    return Paint("distance", "m", "nodes", apart, colors="distance")
 
 
 def _stretch(solution: Solution, state: State, over: Solution | None) -> Paint:
     """Stretch of the springs; without springs that of the edges of elements."""
     lines, fields = _line_fields(solution, state)
     if "stretch" in fields:
-        return Paint("stretch of springs", "-", "lines", fields["stretch"], lines, 1.0, "diverging")
+        return Paint("stretch of springs", "-", "lines", fields["stretch"], lines, 1.0, "coolwarm")
     if solution.is_cloud:
         raise OutputError(f"color = 'stretch': {solution.label} has points only, no springs or elements")
     mesh = solution.problem.mesh
     rest, now = (np.linalg.norm(at[mesh.edges[:, 1]] - at[mesh.edges[:, 0]], axis=1) for at in _both(solution, state))
-    return Paint("stretch of edges", "-", "lines", now / rest, mesh.edges, 1.0, "diverging")
+    return Paint("stretch of edges", "-", "lines", now / rest, mesh.edges, 1.0, "coolwarm")
 
 
 def _both(solution: Solution, state: State) -> tuple[Floats, Floats]:
@@ -85,7 +85,7 @@ def _tension(solution: Solution, state: State, over: Solution | None) -> Paint:
     lines, fields = _line_fields(solution, state)
     for name, label in (("tension", "tension of springs"), ("tension_change", "change of tension of springs")):
         if name in fields:
-            return Paint(label, "N", "lines", fields[name], lines, 0.0, "diverging")
+            return Paint(label, "N", "lines", fields[name], lines, 0.0, "coolwarm")
     raise OutputError(f"color = 'tension': {solution.label} has no springs; use stress, stretch or displacement")
 
 

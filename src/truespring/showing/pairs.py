@@ -1,26 +1,28 @@
-"""A solution, alone or with a reference, as a Result: what figures and animations draw."""
+"""A solution, alone or over a reference, and the levels that both have."""
 
 from pathlib import Path
 
 from truespring.comparison import TOLERANCE, compare, most_moved
-from truespring.errors import OutputError
+from truespring.errors import OutputError, shown
 from truespring.report.result import Result
-from truespring.solution import Solution, State
+from truespring.solution import SAME_LEVEL, Solution, State
+
+#: The name of a file in results that were not read from one.
+_NO_FILE = Path("solution")
 
 
-def result_of(solution: Solution, over: Solution | None, probe: int | None = None) -> Result:
-    """Return the result of a solution, and of a reference that it is compared with."""
-    if not solution.states:
-        raise OutputError(f"{solution.label} is a surface without load levels: nothing moves")
-    name, paths, comparisons = solution.label, {solution.label: solution}, {}
-    watched = most_moved(solution) if probe is None else probe
+def result_of(solution: Solution, over: Solution | None) -> Result:
+    """Return the result of a solution, and of a reference that it is compared with, for figures of reports."""
+    name = solution.label
+    paths, comparisons = {name: solution}, {}
+    watched = most_moved(solution)
     if over is not None:
-        other = over.label if over.label != name else f"{name} (reference)"
+        other = over.label if over.label != name else f"{name}, reference"
         paths[other] = over
         comparisons[other] = compare(solution, over, watched, TOLERANCE)
     return Result(
         title=name,
-        file=Path("solution.toml"),
+        file=_NO_FILE,
         problem=solution.problem,
         paths=paths,
         probe=watched,
@@ -38,9 +40,24 @@ def states_of_both(solution: Solution, over: Solution | None) -> tuple[State, ..
     """
     if over is None:
         return solution.states
-    both = tuple(state for state in solution.states if over.at(state.level) is not None)
+    if not isinstance(over, Solution):
+        raise OutputError(f"over = {shown(over)}: a Solution is expected; a quantity is given as color='stress'")
+    if over.problem.mesh.dim != solution.problem.mesh.dim:
+        raise OutputError(
+            f"{solution.label} has {solution.problem.mesh.dim} dimensions, {over.label} {over.problem.mesh.dim}: they "
+            "cannot be drawn in one picture; truespring.compare compares them"
+        )
+    both = tuple(state for state in solution.states if has_level(over, state.level))
     if not any(state.loaded for state in both):
         raise OutputError(
-            f"{solution.label} and {over.label} have no level above zero in common: solve both with the same load_steps"
+            f"{solution.label} and {over.label} have no load level above zero in common: solve both with the same "
+            "load_steps"
         )
     return both
+
+
+def has_level(solution: Solution, level: float | None) -> bool:
+    """Return whether a solution is known at a level; a surface is at one level only."""
+    if solution.states or level is None:
+        return solution.at(level) is not None
+    return abs(solution.load_factor - level) <= SAME_LEVEL

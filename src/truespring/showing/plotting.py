@@ -1,29 +1,28 @@
 """Pictures of solutions in axes of matplotlib."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truespring.errors import OutputError
 from truespring.report.axis import axis_of
-from truespring.report.bodies import magnification
-from truespring.report.quantity import percent, times
+from truespring.report.bodies import magnification, over_title
+from truespring.report.quantity import times
 from truespring.report.result import Result
-from truespring.report.style import BLUE, FAINT, INK
+from truespring.report.style import BLUE, FAINT, INK, MOTION
+from truespring.report.touching import drawn_tools, entries
+from truespring.showing.frames import Entry, draw_legend, new_axes
 from truespring.showing.levels import numbered
-from truespring.showing.paints import Paint, paint_of
+from truespring.showing.paints import paint_of
 from truespring.showing.pairs import result_of, states_of_both
 from truespring.showing.plane import draw_plane
 from truespring.showing.scenes import Scene
+from truespring.showing.shapes import rest_shape, shape_of
 from truespring.showing.space import draw_space
 from truespring.solution import Solution, State
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-# Width of a figure, least and largest height [inch]: as wide as the text of a notebook.
-_WIDTH, _LEAST, _MOST = 6.4, 2.4, 5.6
-# Room above the body for the legend, below for numbers [inch].
-_HEAD = 1.3
 
 
 def plot_solution(
@@ -35,77 +34,70 @@ def plot_solution(
     axes: "Axes | None",
 ) -> "Axes":
     """Draw a state of a solution into axes, see `Solution.plot`."""
-    result = result_of(solution, over)
+    if hasattr(axes, "get_zlim"):
+        raise OutputError(
+            "ax has three axes: bodies in space are drawn as an image in plane ones: leave projection out"
+        )
+    if not solution.states:
+        return _plot_surface(solution, over, color, axes)
     state = numbered(states_of_both(solution, over), level, solution)
-    paint = None if color is None else paint_of(color, solution, state, over)
-    scene = _scene(result, solution, over, state, magnify, paint)
-    axes = _new_axes(scene) if axes is None else axes
-    draw = draw_plane if solution.problem.mesh.dim == 2 else draw_space
-    draw(axes, scene)
-    _legend(axes, scene)
-    return axes
-
-
-def _scene(
-    result: Result,
-    solution: Solution,
-    over: Solution | None,
-    state: State,
-    magnify: float | None,
-    paint: Paint | None,
-) -> Scene:
-    factor = magnification(result) if magnify is None else float(magnify)
-    rest = solution.problem.mesh.nodes
-    theirs = None if over is None else over.at(state.level)
-    return Scene(
-        solution=solution,
-        over=over,
-        state=state,
-        mine=rest + factor * state.displacement,
-        theirs=None if over is None or theirs is None else over.problem.mesh.nodes + factor * theirs.displacement,
-        factor=factor,
-        paint=paint,
-        title=_title(result, state, factor),
+    result = result_of(solution, over)
+    factor = _factor(result, over, magnify)
+    scene = Scene(
+        mesh=solution.problem.mesh,
+        rest=rest_shape(solution),
+        mine=shape_of(solution, state, factor),
+        theirs=None if over is None else shape_of(over, over.at(state.level), factor),
+        paint=None if color is None else paint_of(color, solution, state, over),
+        tools=drawn_tools(solution.problem, state.level or 0.0),
     )
+    names = [] if color else [Entry(solution.label, BLUE)]
+    names += [] if over is None else [Entry(f"outline of {over.label}" if color else over.label, INK)]
+    names += [Entry("undeformed", FAINT, "--")]
+    names += [Entry(entry.text, MOTION) for entry in entries(solution.problem)]
+    head = [solution.label] if color else []
+    head += [_level_words(result, state)]
+    head += [f"displacements {times(factor)}"] if factor != 1 else []
+    return _draw(scene, head, names, axes)
 
 
-def _title(result: Result, state: State, factor: float) -> str:
-    level = state.load_factor if state.level is None else state.level
-    words = [axis_of(result).words(level).capitalize()]
+def _plot_surface(solution: Solution, over: Solution | None, color: str | None, axes: "Axes | None") -> "Axes":
+    """Draw a surface that was read, which has no displacement."""
+    if over is not None or color is not None:
+        raise OutputError(
+            f"{solution.label} is a surface without displacements: draw it alone, or as the reference: plot(over=...)"
+        )
+    scene = Scene(mesh=solution.problem.mesh, rest=None, mine=shape_of(solution, None, 1.0))
+    return _draw(scene, [solution.label], [Entry(solution.label, BLUE)], axes)
+
+
+def _factor(result: Result, over: Solution | None, magnify: float | None) -> float:
+    """Return the magnification; a surface alone has no displacement to magnify."""
+    if over is not None and not over.states:
+        if magnify not in (None, 1):
+            raise OutputError(f"magnify = {magnify:g}: {over.label} is a surface, whose displacement is not known")
+        return 1.0
+    if magnify is None:
+        return magnification(result)
+    if not (np.isfinite(magnify) and magnify > 0):
+        raise OutputError(f"magnify = {magnify!r}: a factor above 0 is expected, such as 10")
+    return float(magnify)
+
+
+def _level_words(result: Result, state: State) -> str:
+    """Return the level of a state in words, and its distance from a reference."""
+    if state.level is None:
+        return f"{(state.critical or '').capitalize()} at load factor {state.load_factor:.4g}"
     for comparison in result.comparisons.values():
-        known = np.flatnonzero(np.abs(comparison.load_factors - level) < 1e-9)
-        if known.size and np.isfinite(comparison.rms_errors[known[0]]):
-            words.append(f"{percent(float(comparison.rms_errors[known[0]]))} apart (root mean square)")
-    words += [f"displacements {times(factor)}"] if factor != 1 else []
-    return " · ".join(words)
+        known = np.abs(comparison.load_factors - state.level) < 1e-9
+        if known.any() or comparison.surface is not None:
+            shown = int(np.flatnonzero(known)[0]) if known.any() else 0
+            return over_title(result, state.level, comparison, shown)
+    return axis_of(result).words(state.level).capitalize()
 
 
-def _new_axes(scene: Scene) -> "Axes":
-    from matplotlib import pyplot
-
-    low, high = scene.box
-    wide, tall = high - low
-    height = float(np.clip(_WIDTH * tall / wide + _HEAD, _LEAST, _MOST))
-    _, axes = pyplot.subplots(figsize=(_WIDTH, height), layout="constrained")
+def _draw(scene: Scene, title: list[str], names: list[Entry], axes: "Axes | None") -> "Axes":
+    axes = new_axes(*scene.box, has_bar=scene.paint is not None) if axes is None else axes
+    (draw_plane if scene.is_plane else draw_space)(axes, scene)
+    draw_legend(axes, title, names)
     return axes
-
-
-def _legend(axes: "Axes", scene: Scene) -> None:
-    """Write title and names of the bodies above the axes."""
-    from matplotlib.lines import Line2D
-
-    entries = [] if scene.paint is not None else [Line2D([], [], color=BLUE, label=scene.solution.label)]
-    entries += [Line2D([], [], color=INK, label=scene.over.label)] if scene.over is not None else []
-    entries += [Line2D([], [], color=FAINT, ls=(0, (3, 2)), label="undeformed")]
-    legend: Any = axes.legend(
-        handles=entries,
-        title=scene.title,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=len(entries),
-        frameon=False,
-        fontsize="small",
-        alignment="left",
-        borderaxespad=0.2,
-    )
-    legend.set_title(scene.title, prop={"weight": "bold", "size": "medium"})

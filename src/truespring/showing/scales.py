@@ -25,13 +25,13 @@ def formatter(size: float) -> "FuncFormatter":
 
 
 def colors_of(paint: Paint) -> "Colormap":
-    """Return the colours of a paint."""
+    """Return the colours of a paint; NaN is drawn in grey."""
     import matplotlib
     from matplotlib.colors import ListedColormap
 
-    if paint.colors == "distance":
-        return ListedColormap(error_colors(np.linspace(0, 1, 256)), name="distance")
-    return matplotlib.colormaps[{"diverging": "RdBu_r"}.get(paint.colors, paint.colors)]
+    distance = ListedColormap(error_colors(np.linspace(0, 1, 256)), name="distance")
+    colors = distance if paint.colors == "distance" else matplotlib.colormaps[paint.colors]
+    return colors.with_extremes(bad="#d5d9dd")
 
 
 def range_of(paint: Paint) -> "Normalize":
@@ -46,10 +46,10 @@ def range_of(paint: Paint) -> "Normalize":
 
 
 def add_bar(axes: "Axes", drawn: Any, paint: Paint) -> None:
-    """Add a colour bar with the name of the quantity and its unit."""
+    """Add a colour bar as high as the axes, with the name of the quantity and its unit."""
     norm = range_of(paint)
     scale = natural_scale(max(abs(float(norm.vmin or 0.0)), abs(float(norm.vmax or 0.0))), paint.unit)
-    label = paint.label if scale.unit == "-" else f"{paint.label} [{scale.unit}]"
     figure: Any = axes.figure
-    bar = figure.colorbar(drawn, ax=axes, label=label, format=formatter(scale.size), shrink=0.9, pad=0.02)
+    bar = figure.colorbar(drawn, cax=axes.inset_axes((1.03, 0.0, 0.03, 1.0)), format=formatter(scale.size))
+    bar.set_label(paint.label if scale.unit == "-" else f"{paint.label} [{scale.unit}]")
     bar.outline.set_linewidth(0.5)

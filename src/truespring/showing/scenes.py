@@ -1,49 +1,49 @@
 """What a picture of a solution shows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from truespring.arrays import Floats
+from truespring.mesh import Mesh
 from truespring.report.bodies import picture_box
-from truespring.report.touching import view
+from truespring.report.touching import Drawn, near
 from truespring.showing.paints import Paint
-from truespring.solution import Solution, State
+from truespring.showing.shapes import Shape
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A state of a solution over a reference.
+    """A body over a reference, in the coordinates of the picture.
 
     Attributes:
-        solution, over: the two; `over` is None if the solution is alone.
-        state: the state of the solution.
-        mine, theirs: positions of their nodes, displacements magnified [m], shape (n_nodes, dim).
-        factor: magnification of displacements.
+        mesh: the mesh of the body, to which the values of `paint` refer.
+        rest, mine, theirs: the body undeformed and deformed, and the reference; None if there is none.
         paint: values that are drawn as colours, None for one colour.
-        title: words above the picture.
+        tools: tools and grasps.
     """
 
-    solution: Solution
-    over: Solution | None
-    state: State
-    mine: Floats
-    theirs: Floats | None
-    factor: float
-    paint: Paint | None
-    title: str
+    mesh: Mesh
+    rest: Shape | None
+    mine: Shape
+    theirs: Shape | None = None
+    paint: Paint | None = None
+    tools: Sequence[Drawn] = ()
 
     @property
-    def rest(self) -> Floats:
-        """The undeformed nodes [m], shape (n_nodes, dim)."""
-        return self.solution.problem.mesh.nodes
+    def is_plane(self) -> bool:
+        """Whether the bodies are plane."""
+        return bool(self.mine.points.shape[1] == 2)
 
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
         """Lower and upper corner of what is shown in the picture plane [m], shape (2,), with a margin."""
-        points = view(np.concatenate([self.rest, self.mine]))[:, :2]
-        others = [] if self.theirs is None else [view(self.theirs)[:, :2]]
-        lower, upper, _ = picture_box(points, others)
+        own = [one.points[:, :2] for one in (self.rest, self.mine) if one is not None]
+        others = [] if self.theirs is None else [self.theirs.points[:, :2]]
+        lower, upper, _ = picture_box(np.concatenate(own), others)
+        corners = np.concatenate([near(self.tools, lower, upper), lower[None], upper[None]])
+        lower, upper = corners.min(axis=0), corners.max(axis=0)
         margin = 0.04 * float((upper - lower).max())
         return lower - margin, upper + margin

@@ -1,11 +1,13 @@
 """Tables of load levels, and arrays over levels, nodes and components."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from truespring.comparison import most_moved
 from truespring.errors import OutputError
+from truespring.mesh import named_point, nearest_node
 from truespring.mesh.selections import AXES
 from truespring.solution import Solution, State
 
@@ -13,13 +15,30 @@ if TYPE_CHECKING:
     import xarray
 
 
-def columns_of(solution: Solution, probe: int | None) -> dict[str, tuple[str, list[Any]]]:
+Probe = int | str | Sequence[float] | None
+
+
+def columns_of(solution: Solution, probe: Probe) -> dict[str, tuple[str, list[Any]]]:
     """Return the columns of the table of load levels: unit and values, one a state, by name."""
     if not solution.states:
         raise OutputError(f"{solution.label} is a surface without load levels: it has no table")
-    watched = most_moved(solution) if probe is None else probe
+    watched = _watched(solution, probe)
     rows = [_row(solution, state, watched) for state in solution.states]
     return {name: (unit, [row[name][1] for row in rows]) for name, (unit, _) in rows[0].items()}
+
+
+def _watched(solution: Solution, probe: Probe) -> int:
+    """Return the number of the probe node; raise OutputError or MeshError if there is no such node."""
+    mesh = solution.problem.mesh
+    if probe is None:
+        return most_moved(solution)
+    if isinstance(probe, str):
+        return named_point(mesh, probe)
+    if not isinstance(probe, int | np.integer):
+        return nearest_node(mesh, list(probe))
+    if not 0 <= probe < mesh.n_nodes:
+        raise OutputError(f"probe = {probe}: nodes are 0 to {mesh.n_nodes - 1}; or a point such as 'right-middle'")
+    return int(probe)
 
 
 def _row(solution: Solution, state: State, probe: int) -> dict[str, tuple[str, Any]]:
@@ -38,7 +57,7 @@ def _row(solution: Solution, state: State, probe: int) -> dict[str, tuple[str, A
     return row
 
 
-def table_of(solution: Solution, probe: int | None) -> Any:
+def table_of(solution: Solution, probe: Probe) -> Any:
     """Return the table of load levels, see `Solution.table`."""
     columns = columns_of(solution, probe)
     values = {name: entries for name, (_, entries) in columns.items()}
@@ -71,9 +90,13 @@ def arrays_of(solution: Solution) -> "xarray.Dataset":
     def stacked(name: str) -> Any:
         return np.stack([getattr(state, name) for state in states])
 
+    more: dict[str, Any] = {}
+    if states[0].moving is not None:
+        speeds = np.stack([one.moving.velocity[: mesh.n_nodes] for one in states if one.moving is not None])
+        more["velocity"] = (of_nodes, speeds, {"units": "m/s"})
+    times = [one.moving.time for one in states if one.moving is not None]
     return xarray.Dataset(
         {
-            "nodes": (("node", "component"), mesh.nodes, {"units": "m"}),
             "displacement": (of_nodes, stacked("displacement"), {"units": "m"}),
             "reaction": (of_nodes, stacked("reaction"), {"units": "N"}),
             "applied_force": (
@@ -82,12 +105,15 @@ def arrays_of(solution: Solution) -> "xarray.Dataset":
                 {"units": "N"},
             ),
             "energy": (of_levels, stacked("energy"), {"units": "J"}),
+            **more,
         },
         coords={
             "level": np.arange(len(states)),
             "node": np.arange(mesh.n_nodes),
             "component": list(AXES[: mesh.dim]),
+            **{axis: ("node", mesh.nodes[:, place], {"units": "m"}) for place, axis in enumerate(AXES[: mesh.dim])},
             "load_factor": (of_levels, stacked("load_factor"), {"units": "1"}),
+            **({"time": (of_levels, np.array(times), {"units": "s"})} if more else {}),
         },
         attrs={"label": solution.label, "status": str(solution.status)},
     )

@@ -38,7 +38,7 @@ _NO_DIRECTION = (
 # The load does not move the controlled displacement if the first step would move the body by this multiple of its size.
 _FAR = 100.0
 # If no equilibrium is found at a critical point, a state this near stands for it, as a share of the step.
-_NEAR = 1e-6
+_NEAR = 1e-5
 
 # Accuracy of the position of a critical point, as a share of the step.
 _PLACE = 1e-12

@@ -1,5 +1,7 @@
 """Study files: read, check and run them, and write their results."""
 
+from truespring.study.case import Case as Case
+from truespring.study.case import case_of as case_of
 from truespring.study.changes import value_at as value_at
 from truespring.study.export import export_study as export_study
 from truespring.study.export import refused_targets as refused_targets
@@ -20,6 +22,7 @@ from truespring.study.read import StudyText as StudyText
 from truespring.study.read import read_study as read_study
 from truespring.study.read import read_text as read_text
 from truespring.study.run import Known as Known
+from truespring.study.run import Progress as Progress
 from truespring.study.run import run as run
 from truespring.study.several import read_studies as read_studies
 from truespring.study.toml import toml_text as toml_text

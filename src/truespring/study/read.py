@@ -11,9 +11,9 @@ from pydantic import ValidationError
 from truespring.errors import FibreError, LoadError, NoLoadError, PartError, StudyError, ToolError, TruespringError
 from truespring.material import SECTIONS, Section
 from truespring.mesh import Mesh
-from truespring.models import Model, SpringNetwork, check_fibres
+from truespring.models import SpringNetwork, check_fibres
 from truespring.problem import Problem
-from truespring.solvers import Solver
+from truespring.study.case import Case
 from truespring.study.changes import changed
 from truespring.study.faults import fault_lines
 from truespring.study.parsing import parse
@@ -21,36 +21,23 @@ from truespring.study.places import Places
 from truespring.study.schema import Scope, StudyKeys, key_of_tool
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
-    """A study file as objects, checked as far as possible without solving.
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Study(Case):
+    """A study file as objects, checked as far as possible without solving: see `read_study`.
 
-    Attributes:
-        title: title of the report.
+    Attributes, besides those of a case (title, problem, solver, entries, model, references, probe, tolerance, refine):
         text: the file and its TOML, including changed values.
         keys: the checked values in SI units with all defaults; `elements` counts those of the refined mesh.
         halvings: how often the element size of the file was halved.
-        problem, solver: the problem and its solver.
-        entries: the models by name: solved here, by another program, or read from a file (ReadSolution).
-        model: name of the model that is compared with the references.
-        references: names of the reference models.
-        probe: number of the probe's node; None for the node that moves most.
-        tolerance: largest error, rms or of force, at which two results agree.
-        refine: whether each reference is also solved on a finer mesh to estimate its discretisation error.
     """
 
-    title: str
     text: "StudyText"
     keys: StudyKeys
     halvings: int
-    problem: Problem
-    solver: Solver
-    entries: Mapping[str, Model]
-    model: str
-    references: tuple[str, ...]
-    probe: int | None
-    tolerance: float
-    refine: bool = True
+
+    def __repr__(self) -> str:
+        mesh = self.problem.mesh
+        return f"Study({str(self.file)!r}, {mesh.n_nodes} nodes, models: {', '.join(self.entries)})"
 
     @property
     def file(self) -> Path:
@@ -65,11 +52,6 @@ class Study:
     def finer(self, halvings: int = 1) -> "Study":
         """Return the study with the element size halved `halvings` times; raise StudyError if that fails."""
         return self.text.study(halvings=self.halvings + halvings)
-
-    @property
-    def stem(self) -> str:
-        """Name of the file without its suffix, used as the name of the output folder."""
-        return self.file.stem
 
 
 @dataclass(frozen=True)
@@ -106,7 +88,13 @@ class StudyText:
             raise StudyError("\n".join(fault_lines(self.places, error))) from None
 
     def study(self, changes: Mapping[str, Any] | None = None, halvings: int = 0, balanced: bool = True) -> Study:
-        """Return the study, checked as far as possible without solving; raise StudyError. See `read_study`."""
+        """Return the study, checked as far as possible without solving; raise StudyError with all errors.
+
+        Args:
+            changes: other values by dotted key, see `read_study`.
+            halvings: how often to halve the element size.
+            balanced: whether loads and supports have to define an equilibrium; natural frequencies need neither.
+        """
         text = self.changed(changes) if changes else self
         keys = text.keys()
         keys = keys.model_copy(update={"mesh": keys.mesh.finer(halvings)}) if halvings else keys
@@ -118,18 +106,22 @@ def read_text(file: str | Path) -> StudyText:
     return StudyText(Path(file), *parse(Path(file)))
 
 
-def read_study(
-    file: str | Path, halvings: int = 0, changes: Mapping[str, Any] | None = None, balanced: bool = True
-) -> Study:
-    """Read and check a study file; raise StudyError with file, line, key, value and what is allowed.
+def read_study(file: str | Path, /, **changes: Any) -> Study:
+    """Read and check a study file, with other values for some of its keys.
 
     Args:
         file: path of the study.
-        halvings: how often to halve the element size.
-        changes: other values by dotted key: {"material.young": "8 kPa", "load.1.force.2": -0.01}; lists count from 1.
-        balanced: whether loads and supports have to define an equilibrium; natural frequencies need neither.
+        **changes: other values by dotted key; lists count from 1. Numbers are in SI units, strings have a unit.
+
+    Raises StudyError with file, line, key, value, what is allowed and the nearest key.
+
+    >>> import truespring as ts, tempfile, pathlib
+    >>> file = ts.new("strip", pathlib.Path(tempfile.mkdtemp()) / "strip.toml")
+    >>> study = ts.read_study(file, **{"material.poisson": 0.4, "material.young": "8 kPa"})
+    >>> study.problem.material
+    Material(young=8000.0, poisson=0.4, ...)
     """
-    return read_text(file).study(changes, halvings, balanced)
+    return read_text(file).study(changes)
 
 
 # --- from keys to objects -----------------------------------------------------------------------------
@@ -160,6 +152,7 @@ def _build(text: StudyText, keys: StudyKeys, halvings: int, balanced: bool) -> S
         probe=keys.compare.node(places, problem.mesh),
         tolerance=keys.compare.tolerance,
         refine=keys.compare.refine,
+        form=keys.output.build(places),
     )
 
 

@@ -11,7 +11,7 @@ from truespring.models import (
 )
 from truespring.report.result import Result
 from truespring.solvers import Reporter
-from truespring.study.read import Study
+from truespring.study.case import Case
 from truespring.study.splits import motion_errors
 from truespring.study.standings import standings
 
@@ -23,19 +23,19 @@ Known = Callable[[str, Solution], None]
 
 
 def run(
-    study: Study,
+    case: Case,
     progress: Progress | None = None,
     comparing: bool = True,
     timeout: float | None = None,
     known: Known | None = None,
     refining: bool = True,
 ) -> Result:
-    """Solve every model of a study and compare the first springs, or the model of `[compare]`, with the references.
+    """Solve every model of a case and compare the first springs, or the model of `[compare]`, with the references.
 
     A model that fails keeps the load levels that it reached.
 
     Args:
-        study: the study.
+        case: problem, solver and models: a study, or those of `case_of`.
         progress: callback for a progress bar.
         comparing: whether to compare the models and judge the springs.
         timeout: time limit [s] of each model and of the refinement of each reference; default: none, an hour for other
@@ -44,46 +44,47 @@ def run(
         refining: whether to refine references to estimate their discretisation error, if the study allows it.
     """
     paths: dict[str, Solution] = {}
-    for name, entry in study.entries.items():
+    for name, entry in case.entries.items():
 
         def report(load_factor: float, iteration: int, residual: float, name: str = name) -> None:
             if progress:
-                progress(study.stem, name, load_factor)
+                progress(case.stem, name, load_factor)
 
-        paths[name] = follow(study, entry, report, timeout)
+        paths[name] = follow(case, entry, report, timeout)
         if progress and entry.solves:
-            progress(study.stem, name, 1.0)
+            progress(case.stem, name, 1.0)
         if known:
             known(name, paths[name])
-    model = paths[study.model]
-    probe = most_moved(model) if study.probe is None else study.probe
-    names = study.references if comparing else ()
+    model = paths[case.model]
+    probe = most_moved(model) if case.probe is None else case.probe
+    names = case.references if comparing else ()
     return Result(
-        title=study.title,
-        file=study.file,
-        problem=study.problem,
+        title=case.title,
+        file=case.file,
+        problem=case.problem,
         paths=paths,
         probe=probe,
-        model=study.model,
-        comparisons={name: compare(model, paths[name], probe, study.tolerance) for name in names},
-        tolerance=study.tolerance,
-        source=study.source,
+        model=case.model,
+        comparisons={name: compare(model, paths[name], probe, case.tolerance) for name in names},
+        tolerance=case.tolerance,
+        source=case.source,
         fitness={
-            name: judge(study.problem, entry, study.tolerance) for name, entry in springs_by_rule(study.entries).items()
+            name: judge(case.problem, entry, case.tolerance) for name, entry in springs_by_rule(case.entries).items()
         }
         if comparing
         else {},
-        standings=standings(study, paths, names, timeout) if refining else {},
-        splits=motion_errors(study, model, probe, timeout) if comparing and refining else None,
+        standings=standings(case, paths, names, timeout) if refining else {},
+        splits=motion_errors(case, model, probe, timeout) if comparing and refining else None,
+        form=case.form,
     )
 
 
-def follow(study: Study, model: Model, report: Reporter | None = None, timeout: float | None = None) -> Solution:
-    """Return the solution of one model of a study: solved here, solved by another program, or read from a file.
+def follow(case: Case, model: Model, report: Reporter | None = None, timeout: float | None = None) -> Solution:
+    """Return the solution of one model of a case: solved here, solved by another program, or read from a file.
 
     If the model raises an exception, return a solution without load levels that has the reason as a warning.
     """
     try:
-        return solve(study.problem, model, study.solver, report, timeout)
+        return solve(case.problem, model, case.solver, report, timeout)
     except Exception as error:
-        return unsolved(study.problem, model, error)
+        return unsolved(case.problem, model, error)

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from truespring.errors import StudyError
-from truespring.study.read import Study, read_study
+from truespring.study.read import Study, read_text
 
 
 def read_studies(files: Sequence[str | Path], balanced: bool = True) -> list[Study]:
     """Read and check studies; raise StudyError with the errors of all of them, or if two files have the same stem.
 
-    `balanced` is that of `read_study`.
+    `balanced` is that of `StudyText.study`.
     """
     studies: list[Study] = []
     faults: list[str] = []
@@ -23,7 +23,7 @@ def read_studies(files: Sequence[str | Path], balanced: bool = True) -> list[Stu
             )
         seen[stem] = file
         try:
-            studies.append(read_study(file, balanced=balanced))
+            studies.append(read_text(file).study(balanced=balanced))
         except StudyError as error:
             faults.append(str(error))
     if faults:

@@ -10,15 +10,17 @@ from truespring.reactions import moved_supports
 from truespring.report.command import command_line
 from truespring.report.curves import write_curves, write_reactions
 from truespring.report.histories import write_histories
+from truespring.report.paraview import NAME as PARAVIEW
+from truespring.report.paraview import paraview_script
 from truespring.report.result import Result
-from truespring.report.series import write_mesh, write_series, write_stl
+from truespring.report.series import SERIES, Form, write_mesh, write_stl
 from truespring.report.summary import summary
-from truespring.study.read import Study
+from truespring.study.case import Case
 
 
-def output(study: Study | Result, out: Path) -> Output:
-    """Open the output folder of a study, out/STEM."""
-    return Output(out / study.stem, "summary.json")
+def output(case: Case | Result, out: Path) -> Output:
+    """Open the output folder of a case, out/STEM."""
+    return Output(out / case.stem, "summary.json")
 
 
 def write(result: Result, out: Path, report: bool = True, animate: bool = False) -> None:
@@ -28,27 +30,28 @@ def write(result: Result, out: Path, report: bool = True, animate: bool = False)
     """
     with output(result, out) as own:
         for name, path in result.paths.items():
-            write_model(path, own, name)
-        write_rest(result, own, verify_command([result], out, animate) if report else None, animate)
+            write_model(path, own, name, result.form)
+        write_rest(result, own, verify_command([result], out, animate), report, animate)
 
 
-def write_model(path: Solution, output: Output, name: str) -> None:
-    """Write the VTU series and the STL file of one model."""
-    write_series(path, output.staging, name)
+def write_model(path: Solution, output: Output, name: str, form: Form = "vtu") -> None:
+    """Write the levels of one model in a form, and its STL file."""
+    SERIES[form].write(path, output.staging, name)
     write_stl(path, output.staging / f"deformed_{name}.stl")
 
 
-def write_rest(result: Result, output: Output, command: str | None, animate: bool = False) -> str:
+def write_rest(result: Result, output: Output, command: str | None, report: bool = True, animate: bool = False) -> str:
     """Write the files that cover all models and publish the output; return a note on an animation that is missing.
 
-    Figures and report are written only with `command`, the command line that the report shows, animation.gif and
-    animation.mp4 only with `animate`.
+    Figures and report are written only with `report`, animation.gif and animation.mp4 only with `animate`. The report
+    shows `command`, the command line that repeats the run.
     """
     folder = output.staging
     write_curves(result, folder / "curves.csv")
     write_histories(result, folder)
     if moved_supports(result.problem):
         write_reactions(result, folder / "reactions.csv")
+    _write_script(result, folder)
     if result.problem.mesh.element != "line":
         write_mesh(result.problem.mesh, folder / "mesh.vtu", result.problem.loading.held)
     note = ""
@@ -56,7 +59,7 @@ def write_rest(result: Result, output: Output, command: str | None, animate: boo
         from truespring.report.animation import write_animation
 
         note = write_animation(result, folder)
-    if command is not None:
+    if report:
         from truespring.report.downloads import films_in
         from truespring.report.figures import save_figures
         from truespring.report.page import write_page
@@ -67,6 +70,16 @@ def write_rest(result: Result, output: Output, command: str | None, animate: boo
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     output.publish()
     return note
+
+
+def _write_script(result: Result, folder: Path) -> None:
+    """Write the script that opens the models with states in ParaView, deformed; nothing without any."""
+    names = {name: f"{name}{SERIES[result.form].suffix}" for name, path in result.paths.items() if path.states}
+    if names:
+        shown = result.model if result.model in names else next(iter(names))
+        flat = result.problem.mesh.dim == 2
+        script = paraview_script(names, str(shown), "displacement", flat)
+        (folder / PARAVIEW).write_text(script, encoding="utf-8")
 
 
 def write_overview(results: Sequence[Result], out: Path, animate: bool = False) -> None:
@@ -82,7 +95,9 @@ def write_overview(results: Sequence[Result], out: Path, animate: bool = False) 
     write_whole(out / "report.html", page)
 
 
-def verify_command(studies: Sequence[Study | Result], out: Path, animate: bool = False) -> str:
-    """Return the command line that runs `verify` on the studies."""
+def verify_command(cases: Sequence[Case | Result], out: Path, animate: bool = False) -> str | None:
+    """Return the command line that runs `verify` on the studies; None if one of them has no file."""
+    if not all(case.source for case in cases):
+        return None
     more = ["--animate"] if animate else []
-    return command_line(["verify", *(str(study.file) for study in studies), "--out", str(out), *more])
+    return command_line(["verify", *(str(case.file) for case in cases), "--out", str(out), *more])

@@ -14,13 +14,15 @@ from truespring.report.plots import Curve, plot
 from truespring.report.quantity import natural_scale
 from truespring.report.shades import draw_shaded, draw_shaded_dots
 from truespring.report.sheet import Area, Sheet
-from truespring.report.style import BLUE, FAINT, POINT, error_colors
+from truespring.report.style import EQUAL_STYLES, FAINT, POINT, error_colors
 from truespring.report.words import draw_words, text_width
 
 Row = Mapping[str, Any]
 
 # Largest number of lines in a plot, and of plots on a page.
 _MOST_CURVES, _MOST_PLOTS = 8, 12
+# Values that differ by less than this share are the same.
+_SAME = 1e-6
 
 _UNITS = {
     **dict.fromkeys(("young", "pressure", "traction"), "Pa"),
@@ -28,21 +30,11 @@ _UNITS = {
     **dict.fromkeys(("force",), "N"),
     **dict.fromkeys(("moment",), "N m"),
 }
-_STYLES: tuple[tuple[str, Any, str], ...] = (
-    (BLUE, "-", "o"),
-    ("#000000", (0, (6, 2)), "s"),
-    ("#b84a00", (0, (3, 1.5, 1, 1.5)), "^"),
-    ("#00795a", (0, (1.2, 1.6)), "D"),
-    ("#7a4f9c", "-", "v"),
-    ("#3a9bdc", (0, (6, 2)), "P"),
-    ("#70777e", (0, (3, 1.5, 1, 1.5)), "X"),
-    ("#8a5a00", (0, (1.2, 1.6)), "<"),
-)
 
 
 @dataclass(frozen=True)
 class Measured:
-    """The quantity that is drawn.
+    """A quantity that is drawn.
 
     Attributes:
         title: its name.
@@ -55,25 +47,38 @@ class Measured:
     values: Mapping[str, Sequence[float | None]]
 
 
-def measured(rows: Sequence[Row]) -> Measured:
-    """Return the rms error against each reference [%]; without references, the probe's displacement in each model.
+def measured(rows: Sequence[Row]) -> Iterator[Measured]:
+    """Yield the probe's displacement and the force of each model, then the rms error against each reference [%].
 
-    Where displacements may return to zero, as in a motion, it is the largest on the way.
-
-    Values of failed points are None.
+    Where displacements may return to zero, as in a motion, it is the largest on the way. What is the same at all
+    points, such as a force that is not varied, is left out. Values of failed points are None.
     """
+    moves = {name: [moved(row, f"models.{name}.") for row in rows] for name in models_of(rows)}
+    forces = {name: [_length(row, f"models.{name}.force.") for row in rows] for name in models_of(rows)}
+    yield from _varied("Displacement of the probe", "displacement", "m", moves)
+    yield from _varied("Force", "force", "N", forces)
     errors = [column for column in rows[0] if column.startswith("comparison.") and column.endswith(".rms_error")]
-    if errors:
-        names = {column.split(".")[1]: [_times(_known(row, column), 100) for row in rows] for column in errors}
-        return Measured("Rms error", "rms error [%]", names)
-    models = dict.fromkeys(
-        column.split(".")[1] for column in rows[0] if column.startswith("models.") and ".probe_displacement." in column
-    )
-    moves = {name: [_moved(row, f"models.{name}.") for row in rows] for name in models}
-    largest = max((value for values in moves.values() for value in values if value is not None), default=1.0)
-    scale = natural_scale(largest, "m")
-    moves = {name: [_times(value, 1 / scale.size) for value in values] for name, values in moves.items()}
-    return Measured("Displacement of the probe", f"displacement [{scale.unit}]", moves)
+    names = {column.split(".")[1]: [_times(_known(row, column), 100) for row in rows] for column in errors}
+    if any(value is not None for values in names.values() for value in values):
+        yield Measured("Rms error", "rms error [%]", names)
+
+
+def models_of(rows: Sequence[Row]) -> list[str]:
+    """Return the names of the models whose displacement at the probe the rows have."""
+    columns = [column for column in rows[0] if column.startswith("models.") and ".probe_displacement." in column]
+    return list(dict.fromkeys(column.split(".")[1] for column in columns))
+
+
+def _varied(title: str, label: str, unit: str, values: Mapping[str, Sequence[float | None]]) -> Iterator[Measured]:
+    """Yield a quantity in SI with a unit prefix, unless it is the same, or unknown, at all points."""
+    known = [value for column in values.values() for value in column if value is not None]
+    largest = max(known, default=0.0)
+    if len(known) > 1 and largest - min(known) <= _SAME * largest:
+        return
+    if largest > 0:
+        scale = natural_scale(largest, unit)
+        scaled = {name: [_times(value, 1 / scale.size) for value in column] for name, column in values.items()}
+        yield Measured(title, f"{label} [{scale.unit}]", scaled)
 
 
 def _times(value: float | None, factor: float) -> float | None:
@@ -84,7 +89,7 @@ def _known(row: Row, column: str) -> float | None:
     return row[column] if row["status"] == "converged" else None
 
 
-def _moved(row: Row, prefix: str) -> float | None:
+def moved(row: Row, prefix: str) -> float | None:
     """Return the largest displacement of the probe on the way if the row has it, else that at the last level [m]."""
     largest = f"{prefix}largest_probe_displacement"
     return _known(row, largest) if row.get(largest) is not None else _length(row, f"{prefix}probe_displacement.")
@@ -97,20 +102,17 @@ def _length(row: Row, prefix: str) -> float | None:
 
 def sweep_figures(keys: Sequence[str], rows: Sequence[Row]) -> Iterator[Sheet]:
     """Yield the figures of a sweep; their kind depends on how many keys are numbers with several values."""
-    what = measured(rows)
-    if not any(value is not None for values in what.values.values() for value in values):
-        return
     several = [key for key in keys if len({str(row[key]) for row in rows}) > 1]
     numbers = [key for key in several if all(_is_number(row[key]) for row in rows)]
-    others = [key for key in several if key not in numbers]
-    groups = _groups(rows, others)
-    if len(numbers) == 1 and len(groups) <= _MOST_CURVES:
-        yield from _curves(numbers[0], rows, what, groups)
-    elif len(numbers) == 2 and len(groups) * len(what.values) <= _MOST_PLOTS:
-        yield from _maps((numbers[0], numbers[1]), rows, what, groups)
-    else:
-        for key in several[:_MOST_PLOTS]:
-            yield _strips(key, rows, what)
+    groups = _groups(rows, [key for key in several if key not in numbers])
+    for what in measured(rows):
+        if len(numbers) == 1 and len(groups) <= _MOST_CURVES:
+            yield from _curves(numbers[0], rows, what, groups)
+        elif len(numbers) == 2 and len(groups) * len(what.values) <= _MOST_PLOTS:
+            yield from _maps((numbers[0], numbers[1]), rows, what, groups)
+        else:
+            for key in several[:_MOST_PLOTS]:
+                yield _strips(key, rows, what)
 
 
 def _is_number(value: Any) -> bool:
@@ -155,7 +157,7 @@ def _curves(key: str, rows: Sequence[Row], what: Measured, groups: Mapping[str, 
             known = [at for at in groups[group] if what.values[name][at] is not None]
             if known:
                 y = np.array([what.values[name][at] for at in known], dtype=np.float64)
-                color, dashes, marker = _STYLES[place % len(_STYLES)]
+                color, dashes, marker = EQUAL_STYLES[place % len(EQUAL_STYLES)]
                 label_of_line = name if alone else group
                 curves.append(Curve(x[known], y, color, dashes, marker, label_of_line, strong=False))
         if curves:
@@ -275,7 +277,7 @@ def _strips(key: str, rows: Sequence[Row], what: Measured) -> Sheet:
     _strip_frame(area, label, what.label, names)
     draw_words(sheet, left, sheet.height - 0.19, title, 9, bold=True)
     for place, (name, column) in enumerate(what.values.items()):
-        color, _, marker = _STYLES[place % len(_STYLES)]
+        color, _, marker = EQUAL_STYLES[place % len(EQUAL_STYLES)]
         # Points of the same value are shifted sideways by reference.
         aside = (place + 1) / (len(what.values) + 1) - 0.5 if names else 0.0
         at = [number for number, value in enumerate(column) if value is not None]

@@ -4,10 +4,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from truespring.report.downloads import table_download
 from truespring.report.drawing import drawings
-from truespring.report.quantity import percent
+from truespring.report.quantity import percent, quantity
+from truespring.report.rows import table_of
 from truespring.report.shell import pictures, render
-from truespring.sweeping.figures import sweep_figures
+from truespring.sweeping.figures import models_of, moved, sweep_figures
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -79,7 +81,9 @@ def render_sweep(file: Path, title: str | None, keys: Sequence[str], rows: Seque
         failed=[([_words(row[key]) for key in keys], row["reason"]) for row in failed[:_MOST_ROWS]],
         pictures=pictures(drawn, f"{file.stem}_sweep"),
         references=list(extremes),
-        rows=[_shown(row, keys, list(extremes)) for row in rows[:_MOST_ROWS]],
+        models=models_of(rows),
+        rows=[_shown(row, keys, list(extremes), models_of(rows)) for row in rows[:_MOST_ROWS]],
+        downloads=[table_download(f"{file.stem}_sweep.csv", table_of(rows).write_csv(), "all values of all points")],
     )
 
 
@@ -93,11 +97,13 @@ def _sentence(reference: str, two: Mapping[str, Row], keys: Sequence[str]) -> st
     return f"Against {reference} the rms error is from {low} to {high}."
 
 
-def _shown(row: Row, keys: Sequence[str], references: Sequence[str]) -> dict[str, Any]:
+def _shown(row: Row, keys: Sequence[str], references: Sequence[str], models: Sequence[str]) -> dict[str, Any]:
+    moves = (moved(row, f"models.{name}.") for name in models)
     errors = (row[_error_of(reference)] for reference in references)
     return {
         "values": [_words(row[key]) for key in keys],
         "status": row["status"],
+        "moves": ["–" if move is None else quantity(move, "m") for move in moves],
         "errors": ["–" if error is None else percent(error) for error in errors],
         "closest": row["closest"] or "–",
     }

@@ -1,11 +1,13 @@
 """The result of `map_validity`: maps and their verdicts, as table, figures and files."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truespring.report.drawing import Figures, sheets
 from truespring.report.rows import table_of
+from truespring.showing.cards import Card, png_of_sheet
 from truespring.validity.figures import figures
 from truespring.validity.maps import Maps
 from truespring.validity.sentences import verdict
@@ -28,6 +30,13 @@ class Validity(Maps):
     def rows(self) -> list[dict[str, Any]]:
         """One row per load level of each path of springs, as in validity.csv."""
         return list(rows(self))
+
+    def _repr_html_(self) -> str:
+        """Return the verdicts and the first figure as HTML for a notebook."""
+        figures = list(self.figures().values())
+        rows = [(f"{one.load.name}, {one.rule.name}", text) for one, text in zip(self.maps, self.verdicts, strict=True)]
+        picture = partial(png_of_sheet, figures[0]) if figures else None
+        return Card(f"Validity: {self.title}", rows, picture=picture).html()
 
     def table(self) -> "polars.DataFrame":
         """Return `rows` as a table of polars."""

@@ -65,6 +65,9 @@ _PIXEL, _VOXEL = (0, 1, 3, 2), (0, 1, 3, 2, 4, 5, 7, 6)
 #: from inside.
 WEDGE = (0, 2, 1, 3, 5, 4)
 
+#: Names of arrays of `Mesh.to_pyvista` begin with this for a group of facets: bit i of a cell's number is its facet i.
+FACETS = "facets:"
+
 # An array of more distinct values is a quantity, not region labels.
 _MOST_VALUES = 64
 
@@ -111,6 +114,7 @@ def contents(grid: Grid) -> Contents:
         cells=cells,
         node_groups=point_groups(point_arrays),
         cell_groups=cell_groups(cells, cell_arrays),
+        facet_groups=_facet_groups(cell_arrays),
         cell_vectors=vectors(cell_arrays, len(types)),
         notes=notes,
     )
@@ -148,8 +152,22 @@ def _choices(arrays: Arrays) -> list[tuple[str, NDArray[Any]]]:
     return [
         (name, values.ravel())
         for name, values in arrays.items()
-        if values.dtype.kind in "iub" and values.size and values.size == len(values) and name.lower() not in _NO_GROUPS
+        if values.dtype.kind in "iub"
+        and values.size
+        and values.size == len(values)
+        and name.lower() not in _NO_GROUPS
+        and not name.startswith(FACETS)
     ]
+
+
+def _facet_groups(arrays: Arrays) -> dict[str, Ints]:
+    """Return groups of facets, rows of cell and local facet, of the arrays that `Mesh.to_pyvista` makes of them."""
+    found = {}
+    for name, values in arrays.items():
+        if name.startswith(FACETS) and values.dtype.kind in "iu" and values.ndim == 1:
+            local = np.arange(max(int(values.max(initial=0)).bit_length(), 1))
+            found[name.removeprefix(FACETS)] = np.argwhere((values[:, None].astype(np.int64) >> local) & 1)
+    return found
 
 
 def point_groups(arrays: Arrays) -> dict[str, Ints]:

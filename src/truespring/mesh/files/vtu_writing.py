@@ -8,7 +8,7 @@ import sys
 import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -40,23 +40,15 @@ def write_vtu(
         point_arrays, cell_arrays: by name, one row per point, or per cell of all blocks in their order; floats or
             integers.
     """
-    blocks = [(kind, nodes[:, WEDGE] if kind == "wedge" else nodes) for kind, nodes in cells]
-    sizes = [np.full(len(nodes), nodes.shape[1], dtype=np.int64) for _, nodes in blocks]
-    types = [np.full(len(nodes), CELL_SHAPES[kind].vtk_type, dtype=np.uint8) for kind, nodes in blocks]
-    none = np.zeros(0, dtype=np.int64)
-    listed = {
-        "connectivity": np.concatenate([none, *(nodes.ravel().astype(np.int64) for _, nodes in blocks)]),
-        "offsets": np.cumsum(np.concatenate([none, *sizes])),
-        "types": np.concatenate([none.astype(np.uint8), *types]),
-    }
+    listed = listed_cells(cells)
     order = {"little": "LittleEndian", "big": "BigEndian"}[sys.byteorder]
     lines = [
         f'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="{order}" header_type="UInt64" '
         'compressor="vtkZLibDataCompressor">',
         "<UnstructuredGrid>",
-        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(listed["types"])}">',
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(listed.types)}">',
         *_section("Points", {"Points": in_space(points)}),
-        *_section("Cells", listed),
+        *_section("Cells", listed._asdict()),
         *_section("PointData", point_arrays or {}),
         *_section("CellData", cell_arrays or {}),
         "</Piece>",
@@ -64,6 +56,33 @@ def write_vtu(
         "</VTKFile>",
     ]
     file.write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+
+class ListedCells(NamedTuple):
+    """Cells as VTK lists them.
+
+    Attributes:
+        connectivity: the points of all cells, concatenated.
+        offsets: the end of each cell in `connectivity`, shape (n_cells,).
+        types: VTK's cell types, shape (n_cells,).
+    """
+
+    connectivity: NDArray[np.int64]
+    offsets: NDArray[np.int64]
+    types: NDArray[np.uint8]
+
+
+def listed_cells(cells: Iterable[tuple[str, Ints]]) -> ListedCells:
+    """Return blocks of cells as VTK lists them, see `write_vtu`."""
+    blocks = [(kind, nodes[:, WEDGE] if kind == "wedge" else nodes) for kind, nodes in cells]
+    sizes = [np.full(len(nodes), nodes.shape[1], dtype=np.int64) for _, nodes in blocks]
+    types = [np.full(len(nodes), CELL_SHAPES[kind].vtk_type, dtype=np.uint8) for kind, nodes in blocks]
+    none = np.zeros(0, dtype=np.int64)
+    return ListedCells(
+        np.concatenate([none, *(nodes.ravel().astype(np.int64) for _, nodes in blocks)]),
+        np.cumsum(np.concatenate([none, *sizes])),
+        np.concatenate([none.astype(np.uint8), *types]),
+    )
 
 
 def _section(name: str, arrays: Mapping[str, NDArray[Any]]) -> list[str]:

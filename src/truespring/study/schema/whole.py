@@ -1,6 +1,7 @@
 """Keys of a whole study file, of `[solver]` and of `[compare]`."""
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
@@ -11,7 +12,9 @@ from truespring.errors import StudyError, nearest
 from truespring.mesh import Mesh, named_point, nearest_node, select
 from truespring.models import Model
 from truespring.problem import Problem
+from truespring.report.series import Form
 from truespring.solvers import ArcLength, DisplacementControl, Newton, Solver
+from truespring.study.case import compared_model
 from truespring.study.places import Places
 from truespring.study.schema.body import AnyLoad, MaterialKeys, RegionKeys, SectionKeys, SupportKeys
 from truespring.study.schema.meshes import AnyMesh
@@ -185,8 +188,7 @@ class CompareKeys(Keys):
 
     def names(self, places: Places, models: Mapping[str, Model]) -> tuple[str, tuple[str, ...]]:
         """Return the name of the compared model, by default the first springs, and those of its references."""
-        springs = [name for name, model in models.items() if model.has_springs]
-        compared = self.model or (springs or list(models))[0]
+        compared = self.model or compared_model(models)
         self._check_known(places, "model", compared, models)
         if self.references is None:
             return compared, tuple(name for name in models if name != compared)
@@ -203,6 +205,23 @@ class CompareKeys(Keys):
         if name not in models:
             with places.at("compare", key):
                 raise StudyError(f"'{name}' is not among the models{nearest(name, models)}: {', '.join(models)}")
+
+
+class OutputKeys(Keys):
+    """Which files are written."""
+
+    form: Form = Field(
+        default="vtu",
+        description="files of the levels: vtu, a .pvd and a .vtu for each level; or vtkhdf, one HDF5 file, for large "
+        "bodies",
+    )
+
+    def build(self, places: Places) -> Form:
+        """Return the form; raise StudyError if the library that writes it is not installed."""
+        if self.form == "vtkhdf" and find_spec("h5py") is None:
+            with places.at("output", "form"):
+                raise StudyError('"vtkhdf" needs h5py: pip install \'truespring[vtkhdf]\', or use "vtu"')
+        return self.form
 
 
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
@@ -232,6 +251,7 @@ class StudyKeys(Keys):
         description="models to solve, by names of your choice"
     )
     compare: CompareKeys = Field(default=CompareKeys(), description="which models are compared, and where")
+    output: OutputKeys = Field(default=OutputKeys(), description="which files are written")
 
     @field_validator("models")
     @classmethod

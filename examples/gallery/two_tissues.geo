@@ -1,0 +1,22 @@
+// A quarter of a disc of soft tissue with a stiff round lump, in mm: gmsh -2 two_tissues.geo -format msh41
+lump = 6; outer = 20;
+Point(1) = {0, 0, 0, 1.2};
+Point(2) = {lump, 0, 0, 1.0};
+Point(3) = {outer, 0, 0, 2.5};
+Point(4) = {0, outer, 0, 2.5};
+Point(5) = {0, lump, 0, 1.0};
+Line(1) = {1, 2};
+Line(2) = {2, 3};
+Circle(3) = {3, 1, 4};
+Line(4) = {4, 5};
+Line(5) = {5, 1};
+Circle(6) = {2, 1, 5};
+Curve Loop(1) = {1, 6, 5};
+Plane Surface(1) = {1};
+Curve Loop(2) = {2, 3, 4, -6};
+Plane Surface(2) = {2};
+Physical Surface("lump") = {1};
+Physical Surface("tissue") = {2};
+Physical Curve("along x") = {1, 2};
+Physical Curve("along y") = {4, 5};
+Physical Curve("outside") = {3};

@@ -1,0 +1,116 @@
+"""What `run` solves and compares: a problem, its solver and its models."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from truespring.comparison import TOLERANCE
+from truespring.errors import MeshError, ProblemError
+from truespring.mesh import Mesh, named_point, nearest_node
+from truespring.models import Model, as_model, check_fibres
+from truespring.potential import Potential
+from truespring.problem import Problem
+from truespring.report.series import Form
+from truespring.solvers import Newton, Solver, as_solver
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Case:
+    """A problem, its solver and its models, and which of them are compared.
+
+    Attributes:
+        title: title of the report.
+        problem, solver: the problem and its solver.
+        entries: the models by name: solved here, by another program, or read from a file (ReadSolution).
+        model: name of the model that is compared with the references.
+        references: names of the reference models.
+        probe: number of the probe's node; None for the node that moves most.
+        tolerance: largest error, rms or of force, at which two results agree.
+        refine: whether each reference is also solved on a finer mesh to estimate its discretisation error.
+        form: form of the files of the levels.
+    """
+
+    title: str
+    problem: Problem
+    solver: Solver
+    entries: Mapping[str, Model]
+    model: str
+    references: tuple[str, ...]
+    probe: int | None
+    tolerance: float
+    refine: bool = True
+    form: Form = "vtu"
+
+    @property
+    def file(self) -> Path:
+        """Path of the study file as the user gave it; without a file, the title as a name of a folder."""
+        return Path(re.sub(r"[^\w-]+", "-", self.title))
+
+    @property
+    def source(self) -> str:
+        """Text of the study file; empty without a file."""
+        return ""
+
+    @property
+    def stem(self) -> str:
+        """Name of the output folder: that of the file without its suffix."""
+        return self.file.stem
+
+
+def case_of(
+    problem: Problem,
+    models: Mapping[str, Model | Potential],
+    *,
+    solver: Solver | None = None,
+    probe: int | str | Sequence[float] | None = None,
+    tolerance: float = TOLERANCE,
+    refine: bool = True,
+    title: str = "problem",
+) -> Case:
+    """Return the case of a problem with models by name, which are compared as those of a study.
+
+    Raises ProblemError if there is no model, if a name cannot be that of a file, or if `tolerance` is not between 0
+    and 1, ModelError if a model has the wrong type or does not fit the problem, MeshError if the probe does not exist.
+    """
+    if not models:
+        raise ProblemError("verify needs models: models={'springs': Springs(rule='gaussian'), 'fem': Fem(...)}")
+    if not 0 < tolerance < 1:
+        raise ProblemError(f"tolerance = {tolerance} is not between 0 and 1")
+    for name in models:
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
+            raise ProblemError(f"models: '{name}' is not a name: use letters, digits, - and _, such as 'springs'")
+    entries = {name: as_model(model) for name, model in models.items()}
+    for entry in entries.values():
+        check_fibres(problem, entry)
+    model = compared_model(entries)
+    return Case(
+        title=title,
+        problem=problem,
+        solver=Newton() if solver is None else as_solver(solver),
+        entries=entries,
+        model=model,
+        references=tuple(name for name in entries if name != model),
+        probe=None if probe is None else _node(problem.mesh, probe),
+        tolerance=tolerance,
+        refine=refine,
+    )
+
+
+def _node(mesh: Mesh, probe: int | str | Sequence[float]) -> int:
+    """Return the number of the probe's node; raise MeshError if there is none."""
+    if isinstance(probe, str):
+        return named_point(mesh, probe)
+    if not isinstance(probe, int | np.integer):
+        return nearest_node(mesh, list(probe))
+    if not 0 <= probe < mesh.n_nodes:
+        raise MeshError(f"probe = {probe}: the mesh has {mesh.n_nodes} nodes, counted from 0")
+    return int(probe)
+
+
+def compared_model(models: Mapping[str, Model]) -> str:
+    """Return the name of the model that is compared with the others by default: the first springs, else the first."""
+    springs = [name for name, model in models.items() if model.has_springs]
+    return (springs or list(models))[0]
