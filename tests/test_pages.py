@@ -12,13 +12,13 @@ from typing import Any
 
 import pytest
 
-from truespring.cli.new import _kinds
 from truespring.cli.parser import VERBS, parse
 from truespring.equilibrium import Status
 from truespring.errors import TruespringError
 from truespring.models.findings import CODES
 from truespring.study import read_study, run
 from truespring.study.toml import toml_text
+from truespring.templates import new
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
@@ -31,11 +31,11 @@ _START = re.compile(r"truespring new (\w+)|^```toml\n(.*?)^```", re.DOTALL | re.
 
 
 def base_of(kind: str) -> dict[str, Any]:
-    return tomllib.loads(_kinds()[kind].read_text(encoding="utf-8"))
+    return tomllib.loads(new(kind))
 
 
 def changed(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
-    """Return a study with tables of its own replaced: a table by one of the same header, a list of tables as a whole."""
+    """Return a study with tables replaced by those of the same header, a list of tables as a whole."""
     models = {**base["models"], **tables.get("models", {})}
     return {**base, **tables, "models": models}
 
