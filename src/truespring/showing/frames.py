@@ -165,7 +165,8 @@ def draw_legend(axes: "Axes", words: Sequence[str], entries: Sequence[Entry]) ->
     """Write a title and names above the axes, in as many lines as their width needs."""
     from matplotlib.lines import Line2D
 
-    wide = axes.get_position().width * float(axes.figure.get_figwidth())  # [inch], before constraints of the layout
+    figure: Any = axes.get_figure(root=True)
+    wide = axes.get_position().width * float(figure.get_figwidth())  # [inch], before constraints of the layout
     title = _wrapped(words, int(wide / _LETTER))
     rows = -(-sum(len(entry.text) + _HANDLE for entry in entries) // int(1.5 * wide / _LETTER))
     legend: Any = axes.legend(
