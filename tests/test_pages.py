@@ -128,7 +128,8 @@ def texts(function: ast.FunctionDef, constants: dict[str, str]) -> Iterator[str]
     todo: list[ast.AST] = list(function.body[1:] if ast.get_docstring(function) else function.body)
     while todo:
         node = todo.pop()
-        if isinstance(node, ast.Raise):
+        logged = isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("info", "warning")
+        if isinstance(node, ast.Raise) or logged:
             continue
         text = template(node, constants) if isinstance(node, ast.expr) else None
         if text is None:
