@@ -362,7 +362,7 @@ def test_a_folder_tells_the_forces_of_its_study(tmp_path: Path) -> None:
     rows = rows_of(tmp_path / "out" / "pull" / "reactions.csv")
     assert len(rows) == 2 * 3 and {(row["support"], row["on"]) for row in rows} == {("2", "right")}
     curves = rows_of(tmp_path / "out" / "pull" / "curves.csv")
-    assert [(row["fx"], row["fy"]) for row in rows] == [(row["fx"], row["fy"]) for row in curves]
+    assert [(row["fx [N]"], row["fy [N]"]) for row in rows] == [(row["fx"], row["fy"]) for row in curves]
 
 
 # --- calibration --------------------------------------------------------------------------------------------------
