@@ -14,7 +14,9 @@ def tables(problem: ts.Problem, folder: Path) -> tuple[ts.Solution, dict[str, li
     path = ts.solve(problem, ts.Springs("gaussian"), ts.Newton(2))
     found = Result("fall", Path("fall.toml"), problem, {"springs": path}, 0, None, {}, 0.05, "")
     write_histories(found, folder)
-    return path, {file.name: list(csv.DictReader(file.open(encoding="utf-8"))) for file in folder.glob("*.csv")}
+    return path, {
+        file.name: list(csv.DictReader(file.read_text(encoding="utf-8").splitlines())) for file in folder.glob("*.csv")
+    }
 
 
 def test_a_falling_body(tmp_path: Path) -> None:
