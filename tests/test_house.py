@@ -136,7 +136,7 @@ ALLOWED = {
         "report",
         "study",
     },
-    "sweeping": {"study", "report", "outputs"},
+    "sweeping": {"study", "report", "outputs", "showing"},
     "verifying": {"models", "outputs", "potential", "problem", "report", "showing", "solution", "solvers", "study"},
     "templates": set(),
     "versions": set(),

@@ -215,6 +215,14 @@ def test_without_axes_the_figure_is_one_of_pyplot(springs: ts.Solution) -> None:
 def test_an_animation_has_a_frame_for_each_level(springs: ts.Solution, finite: ts.Solution, tmp_path: Path) -> None:
     with Image.open(springs.animate(tmp_path / "a" / "springs.gif", over=finite)) as film:
         assert getattr(film, "n_frames") == len(springs.states)  # noqa: B009
+    with Image.open(springs.animate(tmp_path / "colours.gif", color="displacement")) as film:
+        # At rest all is of the first colour, at full load colours up to the last one, that of the bar, are there.
+        seen = []
+        for number in range(len(springs.states)):
+            film.seek(number)
+            pixels = np.asarray(film.convert("RGB")).astype(int)[:, : int(0.8 * film.width)]  # without the bar
+            seen.append((np.abs(pixels - [253, 231, 37]).max(axis=-1) < 40).sum())
+        assert seen[0] == 0 and seen[-1] > 50
     with pytest.raises(OutputError, match=r"the suffix of an animation is \.gif or \.mp4, not '\.avi'"):
         springs.animate(tmp_path / "springs.avi")
     surface = ts.read_stl(springs.problem, springs.write(tmp_path / "springs.stl"))

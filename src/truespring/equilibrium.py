@@ -1,5 +1,6 @@
 """solve(problem, model, solver) -> Solution: compute the equilibria of a body."""
 
+import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -33,6 +34,8 @@ from truespring.solution import Status as Status
 from truespring.solvers import Coarse, Equilibrium, Geometry, Newton, Reporter, Solver, as_solver
 from truespring.soundness import UNBALANCED, path_status, path_warnings
 
+_LOGGER = logging.getLogger(__name__)
+
 # Largest number of nodes of the coarsest mesh of multigrid.
 _COARSEST = 60
 # Smallest number of cells along each axis of a coarser mesh: with fewer its states differ too much.
@@ -59,6 +62,8 @@ def solve(
         progress: called after each iteration with load factor, iteration and relative residual.
         timeout: time limit [s]; none by default, an hour for another program.
 
+    The logger "truespring.equilibrium" has a message of level INFO for each solution, and of DEBUG for each iteration.
+
     Solver failures are not exceptions: see Solution.status and Solution.best. An exception of a numerical library ends
     the solution at the last equilibrium. Raises ModelError if the model does not fit the problem, ProblemError if the
     solver does not.
@@ -69,19 +74,45 @@ def solve(
     if isinstance(model, Program):
         if ranks.size > 1 and model.solves:
             raise ModelError(f"{model.label}: another program runs beside one process only: start one process")
-        return model.run(problem, solver, progress, timeout)
+        return _logged(model.run(problem, solver, progress, timeout))
     moduli = model.moduli(problem.homogeneous[0]) if problem.material is not None else None
     from truespring.kernels.threads import compiling
 
     with compiling() as compiled:
         started = time.perf_counter()
         try:
-            path = _solve(problem, model, solver, _timed(progress, timeout, ranks), ranks)
+            report = _logging(model.label_on(problem), _timed(progress, timeout, ranks))
+            path = _solve(problem, model, solver, report, ranks)
         except Exception as error:
             if not ranks.is_on_all(error):
                 raise OneProcessError(error_words(error)) from error
             raise
-        return replace(path, seconds=time.perf_counter() - started - compiled(), moduli=moduli)
+        return _logged(replace(path, seconds=time.perf_counter() - started - compiled(), moduli=moduli))
+
+
+def _logged(path: Solution) -> Solution:
+    """Return a solution after a message on status, levels and time, and one for each warning."""
+    _LOGGER.info(
+        "%s: %s, load factor %g, %d levels, %d Newton iterations, %d unknowns, %.2f s",
+        *(path.label, path.status, path.load_factor, len(path.states), path.newton_iterations),
+        *(path.n_unknowns, path.seconds),
+    )
+    for warning in path.warnings:
+        _LOGGER.info("%s: warning: %s", path.label, warning)
+    return path
+
+
+def _logging(label: str, report: Reporter | None) -> Reporter | None:
+    """Return a reporter that also writes a message for each iteration, if the logger is enabled for DEBUG."""
+    if not _LOGGER.isEnabledFor(logging.DEBUG):
+        return report
+
+    def logging_each(load_factor: float, iteration: int, residual: float) -> None:
+        _LOGGER.debug("%s: load factor %g, iteration %d, residual %.3e", label, load_factor, iteration, residual)
+        if report:
+            report(load_factor, iteration, residual)
+
+    return logging_each
 
 
 def _timed(report: Reporter | None, timeout: float | None, ranks: Communicator) -> Reporter | None:

@@ -402,14 +402,16 @@ class Solution:
 
         return plot_solution(self, over, color, level, magnify, ax)
 
-    def animate(self, file: str | Path, over: "Solution | None" = None) -> Path:
+    def animate(self, file: str | Path, over: "Solution | None" = None, color: str | None = None) -> Path:
         """Write an animation of the states as .gif or .mp4.
 
         Args:
             file: the file; its folder is created. MP4 needs imageio-ffmpeg.
             over: a reference, drawn in black.
+            color: quantity that colours show, see `plot`; the same in all frames.
 
-        Returns the path of the file. Raises OutputError for another suffix, fewer than two levels, or if ffmpeg fails.
+        Returns the path of the file. Raises OutputError for another suffix, a quantity that the solution does not
+        have, fewer than two levels, or if ffmpeg fails.
 
         Example:
             >>> solution.animate("bent.gif", over=reference).name
@@ -417,4 +419,4 @@ class Solution:
         """
         from truespring.showing.films import animate
 
-        return animate(self, Path(file), over)
+        return animate(self, Path(file), over, color)

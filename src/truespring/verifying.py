@@ -1,5 +1,6 @@
 """Verify studies: solve and compare their models, and write curves, figures and a report."""
 
+import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -11,7 +12,7 @@ from truespring.outputs import writing
 from truespring.potential import Potential
 from truespring.problem import Problem
 from truespring.report.result import Result
-from truespring.showing.progress import bars
+from truespring.showing.progress import bars, chosen
 from truespring.solution import Solution
 from truespring.solvers import Solver
 from truespring.study import (
@@ -27,6 +28,8 @@ from truespring.study import (
     write_overview,
     write_rest,
 )
+
+_LOGGER = logging.getLogger(__name__)
 
 #: Returns a context that shows the progress while it is open, by the callback that it yields.
 Bars = Callable[[], AbstractContextManager[Progress | None]]
@@ -86,9 +89,8 @@ def verify(
     """
     options = {"solver": solver, "probe": probe, "tolerance": tolerance, "refine": refine, "title": title}
     case = _case(study, models, {key: value for key, value in options.items() if value is not None})
-    chosen: Bars = (bars if progress else nullcontext) if isinstance(progress, bool) else lambda: nullcontext(progress)
     folder = None if out is None else Path(out)
-    ((result, _),) = verify_each([case], folder, chosen, timeout=timeout, animate=animate)
+    ((result, _),) = verify_each([case], folder, lambda: chosen(progress, bars), timeout=timeout, animate=animate)
     return result
 
 
@@ -161,4 +163,5 @@ def _written(
         with writing(out):
             (out / "report.html").unlink(missing_ok=True)  # a report of an earlier command
             note = write_rest(result, opened, verify_command([result], out, animate), comparing, animate)
+    _LOGGER.info("%s: written to %s", case.stem, opened.folder)
     return result, note

@@ -19,6 +19,7 @@ from truespring.deprecation import renamed_argument
 from truespring.equilibrium import Solution, Status, solve
 from truespring.errors import ProblemError
 from truespring.models import Springs
+from truespring.showing.progress import chosen, steps
 
 #: Default weight of the regularisation: an error of 1 % weighs as much as a change of all unknowns by 1.
 REGULARISATION = 0.01
@@ -35,7 +36,7 @@ def calibrate(
     held_out: LoadCase | Sequence[LoadCase] = (),
     regularisation: float = REGULARISATION,
     evaluations: int = 20,
-    progress: Progress | None = None,
+    progress: bool | Progress | None = True,
 ) -> Calibration:
     """Fit the stiffness of springs to references of load cases, and test them on cases held out.
 
@@ -50,7 +51,8 @@ def calibrate(
         held_out: load cases to test on.
         regularisation: weight of the term toward the rule, see `Objective`.
         evaluations: largest number of evaluations of the objective, each of which solves all cases.
-        progress: called with the current step and the share of the work done.
+        progress: whether to show a progress bar in a notebook or terminal; or a callback with the
+            current step and the share of the work done.
 
     Raises ModelError or ProblemError if springs, unknowns or cases do not fit together.
     """
@@ -64,7 +66,24 @@ def calibrate(
     body = fitted[0].problem
     require_one_body([(case.name, case.problem) for case in (*fitted, *tested)], body)
     found = make_unknowns(body, springs, unknowns)
-    progress = progress or (lambda text, share: None)
+    with chosen(progress, lambda: steps("calibration")) as advance:
+        return _calibrated(found, springs, (fitted, tested), regularisation, evaluations, advance or _unseen)
+
+
+def _unseen(step: str, share: float) -> None:
+    """Show no progress."""
+
+
+def _calibrated(
+    found: Unknowns,
+    springs: Springs,
+    cases: tuple[Sequence[LoadCase], Sequence[LoadCase]],
+    regularisation: float,
+    evaluations: int,
+    progress: Progress,
+) -> Calibration:
+    """Return the fitted springs; see `calibrate`. `cases` are those to fit and those held out."""
+    fitted, tested = cases
     progress("equilibrium of full fields", 0.0)
     system = equations(found, fitted)
     starts = {"rule": found.start}

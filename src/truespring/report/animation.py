@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truespring.arrays import Floats
 from truespring.errors import one_line
 from truespring.report.frame import EDGE
 from truespring.report.reel import Reel, reel_of, sheet_of, shots, shown_reference
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 _SHADES, _COLORS = (1.0, 0.65, 0.3), {2: 8, 3: 32}
 # Frames, resolution [pixels/inch], duration of all frames [s], shortest and longest of a frame [ms].
 FRAMES, _DPI, _LASTS, _SHORTEST, _LONGEST = 60, 80, 4.0, 40, 400
+
+# Colours beyond this in red, green and blue are white.
+_ALMOST_WHITE = 0.97
 
 # Largest size of the bodies in space that are rendered at once [bytes].
 _MOST = 200_000_000
@@ -39,7 +43,7 @@ def write_animation(result: Result, folder: Path) -> str:
     if reel is None:
         return "no animation: fewer than two levels are known"
     frames = frames_of(reel)
-    write_gif(reel, frames, folder / "animation.gif")
+    write_gif(frames, folder / "animation.gif", common_colors(reel, frames))
     if importlib.util.find_spec("imageio_ffmpeg") is None:
         return NO_VIDEO
     film = folder / "animation.mp4"
@@ -87,26 +91,37 @@ def _pause(n_frames: int) -> int:
     return int(np.clip(1000 * _LASTS / n_frames, _SHORTEST, _LONGEST)) // 10 * 10  # a GIF counts 10 ms
 
 
-def write_gif(reel: Reel, frames: list[NDArray[np.uint8]], file: Path) -> None:
-    """Write the frames of a reel as GIF; the last one stays longer. The colours of lines are kept, and few others."""
+def common_colors(reel: Reel, frames: list[NDArray[np.uint8]]) -> Floats:
+    """Return the commonest colours of a reel [-], 0 to 1, shape (n, 3), beside those of lines."""
+    from PIL import Image
+
+    n_colors = _COLORS[reel.mesh.dim]
+    middle = Image.fromarray(frames[len(frames) // 2])
+    listed = middle.quantize(n_colors, dither=Image.Dither.NONE).getpalette() or []
+    found = np.array(listed[: 3 * n_colors]).reshape(-1, 3) / 255
+    return np.asarray(found[found.min(axis=1) < _ALMOST_WHITE])  # Pillow would take them for the white of the paper
+
+
+def write_gif(frames: list[NDArray[np.uint8]], file: Path, colors: Floats) -> None:
+    """Write frames as GIF; the last one stays longer. `colors`, shape (n, 3), are kept, and those of lines."""
     from PIL import Image
 
     pause = _pause(len(frames))
-    palette = _palette(frames[len(frames) // 2], _COLORS[reel.mesh.dim])
+    palette = _palette(colors)
     first, *others = [Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
     pauses = [pause] * (len(frames) - 1) + [max(pause, 800)]
     first.save(file, save_all=True, append_images=others, duration=pauses, loop=0, optimize=True)
 
 
-def _palette(frame: NDArray[np.uint8], colors: int) -> "Image.Image":
-    """Return one palette for all frames: colours of lines, fading to white, and the `colors` commonest of a frame."""
+def _palette(colors: Floats) -> "Image.Image":
+    """Return one palette for all frames: colours of lines, fading to white, and others [-], shape (n, 3)."""
     from PIL import Image
 
     lines = np.array([255 * rgb(color) for color in (INK, BLUE, RED, LOAD, MOTION, FAINT, EDGE)])
     faded = [255 - share * (255 - lines) for share in _SHADES]
-    common = Image.fromarray(frame).quantize(colors, dither=Image.Dither.NONE).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette([255, 255, 255, *np.rint(np.ravel(faded)).astype(int).tolist(), *common[: 3 * colors]])
+    listed = np.concatenate([np.full(3, 255), np.ravel(faded), 255 * colors.ravel()])
+    palette.putpalette(np.rint(listed).astype(int).tolist())
     return palette
 
 

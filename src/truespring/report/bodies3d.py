@@ -141,7 +141,8 @@ def over_layers(model: Solution, mine: Floats, reference: Solution | None, their
     if reference is None or theirs is None:
         if not len(facets):
             return (wires(mine, facets, path_lines(model), 0.8),)
-        return (solid(mine, facets, one_color(facets, BODY), path_lines(model), BLUE, 0.8),)
+        body = solid(mine, facets, one_color(facets, BODY), path_lines(model), BLUE, 0.8)
+        return body, wires(mine, facets, outline(mine, facets, silhouette=True), 0.8)
     others, lines = facets_of(reference.problem.mesh), path_lines(reference)
     if len(others):
         black = solid(theirs, others, one_color(others, REFERENCE), lines, INK, 1.2)

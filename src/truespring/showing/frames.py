@@ -45,11 +45,15 @@ def new_axes(low: Floats, high: Floats, has_bar: bool = False) -> "Axes":
     """Return the axes of a new figure of pyplot, which notebooks show and `pyplot.show` opens, for a box [m]."""
     from matplotlib import pyplot
 
+    _, axes = pyplot.subplots(figsize=figure_size(low, high, has_bar), layout="constrained")
+    return axes
+
+
+def figure_size(low: Floats, high: Floats, has_bar: bool) -> tuple[float, float]:
+    """Return width and height of a figure of a box [inch]."""
     wide, tall = high - low
     room = _WIDTH - _SIDE - _BAR * has_bar
-    height = float(np.clip(room * tall / wide + _HEAD, _LEAST_BAR if has_bar else _LEAST, _MOST))
-    _, axes = pyplot.subplots(figsize=(_WIDTH, height), layout="constrained")
-    return axes
+    return _WIDTH, float(np.clip(room * tall / wide + _HEAD, _LEAST_BAR if has_bar else _LEAST, _MOST))
 
 
 def frame_plane(axes: "Axes", low: Floats, high: Floats) -> None:
@@ -165,7 +169,8 @@ def draw_legend(axes: "Axes", words: Sequence[str], entries: Sequence[Entry]) ->
     """Write a title and names above the axes, in as many lines as their width needs."""
     from matplotlib.lines import Line2D
 
-    wide = axes.get_position().width * float(axes.figure.get_figwidth())  # [inch], before constraints of the layout
+    figure: Any = axes.figure
+    wide = axes.get_position().width * figure.bbox.width / figure.dpi  # [inch], before constraints of the layout
     title = _wrapped(words, int(wide / _LETTER))
     rows = -(-sum(len(entry.text) + _HANDLE for entry in entries) // int(1.5 * wide / _LETTER))
     legend: Any = axes.legend(

@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.comparison import compare
 from truespring.errors import OutputError, nearest, shown
 from truespring.potential import Visible
+from truespring.showing.pairs import Pair
 from truespring.solution import Solution, State
 
 
@@ -25,6 +25,7 @@ class Paint:
         lines: node numbers of the lines, shape (n_lines, 2); of values on lines only.
         middle: the value of the middle colour, if larger and smaller values are of different kinds.
         colors: name of a colour map of matplotlib, or "distance", the colours of reports.
+        span: values of the first and the last colour; by default as `limits`.
     """
 
     label: str
@@ -34,28 +35,40 @@ class Paint:
     lines: Ints = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     middle: float | None = None
     colors: str = "viridis"
+    span: tuple[float, float] | None = None
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The values of the first and the last colour: from zero, or as far to both sides of the middle."""
+        if self.span is not None:
+            return self.span
+        known = self.values[np.isfinite(self.values)]
+        if self.middle is None:
+            return 0.0, float(known.max(initial=0.0)) or 1.0
+        far = float(np.abs(known - self.middle).max(initial=0.0)) or 1.0
+        return self.middle - far, self.middle + far
 
 
-def paint_of(color: str, solution: Solution, state: State, over: Solution | None) -> Paint:
-    """Return the values of a quantity, a key of COLORS.
+def paint_of(color: str, pair: Pair, state: State) -> Paint:
+    """Return the values of a quantity, a key of COLORS, at a state.
 
     Raises OutputError if the name is unknown or the solution does not have the quantity.
     """
     if color not in COLORS:
         allowed = ", ".join(COLORS)
         raise OutputError(f"color = {shown(color)} is unknown{nearest(str(color), COLORS)}; allowed: {allowed}")
-    return COLORS[color](solution, state, over)
+    return COLORS[color](pair, state)
 
 
-def _displacement(solution: Solution, state: State, over: Solution | None) -> Paint:
+def _displacement(pair: Pair, state: State) -> Paint:
     return Paint("displacement", "m", "nodes", np.linalg.norm(state.displacement, axis=1))
 
 
-def _distance(solution: Solution, state: State, over: Solution | None) -> Paint:
+def _distance(pair: Pair, state: State) -> Paint:
     """Distance of the nodes from a reference."""
-    if over is None:
+    solution, over, comparison = pair.solution, pair.over, pair.comparison
+    if over is None or comparison is None:
         raise OutputError("color = 'distance' needs a reference: plot(over=reference, color='distance')")
-    comparison = compare(solution, over)
     mine, theirs = comparison.model.at(state.level), comparison.reference.at(state.level)
     if mine is None or theirs is None or len(mine.displacement) != solution.problem.mesh.n_nodes:
         raise OutputError(f"the distance from {over.label} is not known at the nodes of {solution.label}")
@@ -64,8 +77,9 @@ def _distance(solution: Solution, state: State, over: Solution | None) -> Paint:
     return Paint("distance", "m", "nodes", apart, colors="distance")
 
 
-def _stretch(solution: Solution, state: State, over: Solution | None) -> Paint:
+def _stretch(pair: Pair, state: State) -> Paint:
     """Stretch of the springs; without springs that of the edges of elements."""
+    solution = pair.solution
     lines, fields = _line_fields(solution, state)
     if "stretch" in fields:
         return Paint("stretch of springs", "-", "lines", fields["stretch"], lines, 1.0, "coolwarm")
@@ -80,8 +94,9 @@ def _both(solution: Solution, state: State) -> tuple[Floats, Floats]:
     return solution.problem.mesh.nodes, state.positions
 
 
-def _tension(solution: Solution, state: State, over: Solution | None) -> Paint:
+def _tension(pair: Pair, state: State) -> Paint:
     """Tension of springs; of Gaussian springs its change."""
+    solution = pair.solution
     lines, fields = _line_fields(solution, state)
     for name, label in (("tension", "tension of springs"), ("tension_change", "change of tension of springs")):
         if name in fields:
@@ -89,8 +104,9 @@ def _tension(solution: Solution, state: State, over: Solution | None) -> Paint:
     raise OutputError(f"color = 'tension': {solution.label} has no springs; use stress, stretch or displacement")
 
 
-def _stress(solution: Solution, state: State, over: Solution | None) -> Paint:
+def _stress(pair: Pair, state: State) -> Paint:
     """Von Mises stress of the elements: sqrt(3/2 s : s), s the deviator of the true stress."""
+    solution = pair.solution
     fields = _element_fields(solution, state)
     if "stress" not in fields:
         has = "springs have a tension" if solution.has_springs else "results that were read have no stress"
@@ -138,7 +154,7 @@ def _element_fields(solution: Solution, state: State) -> dict[str, Floats]:
 
 
 #: Quantities that colours may stand for, by the value of `color`.
-COLORS: dict[str, Callable[[Solution, State, Solution | None], Paint]] = {
+COLORS: dict[str, Callable[[Pair, State], Paint]] = {
     "distance": _distance,
     "displacement": _displacement,
     "stretch": _stretch,

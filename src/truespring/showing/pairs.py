@@ -1,8 +1,10 @@
 """A solution, alone or over a reference, and the levels that both have."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
-from truespring.comparison import TOLERANCE, compare, most_moved
+from truespring.comparison import TOLERANCE, Comparison, compare, most_moved
 from truespring.errors import OutputError, shown
 from truespring.report.result import Result
 from truespring.solution import SAME_LEVEL, Solution, State
@@ -11,33 +13,48 @@ from truespring.solution import SAME_LEVEL, Solution, State
 _NO_FILE = Path("solution")
 
 
-def result_of(solution: Solution, over: Solution | None) -> Result:
-    """Return the result of a solution, and of a reference that it is compared with, for figures of reports."""
-    name = solution.label
-    paths, comparisons = {name: solution}, {}
-    watched = most_moved(solution)
-    if over is not None:
-        other = over.label if over.label != name else f"{name}, reference"
-        paths[other] = over
-        comparisons[other] = compare(solution, over, watched, TOLERANCE)
-    return Result(
-        title=name,
-        file=_NO_FILE,
-        problem=solution.problem,
-        paths=paths,
-        probe=watched,
-        model=name,
-        comparisons=comparisons,
-        tolerance=TOLERANCE,
-        source="",
-    )
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A solution, and a reference that is drawn with it; None without one."""
+
+    solution: Solution
+    over: Solution | None = None
+
+    @cached_property
+    def result(self) -> Result:
+        """The two as a result, for figures of reports."""
+        solution, over = self.solution, self.over
+        name = solution.label
+        paths, comparisons = {name: solution}, {}
+        watched = most_moved(solution)
+        if over is not None:
+            other = over.label if over.label != name else f"{name}, reference"
+            paths[other] = over
+            comparisons[other] = compare(solution, over, watched, TOLERANCE)
+        return Result(
+            title=name,
+            file=_NO_FILE,
+            problem=solution.problem,
+            paths=paths,
+            probe=watched,
+            model=name,
+            comparisons=comparisons,
+            tolerance=TOLERANCE,
+            source="",
+        )
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """The errors against the reference; None without one."""
+        return next(iter(self.result.comparisons.values()), None)
 
 
-def states_of_both(solution: Solution, over: Solution | None) -> tuple[State, ...]:
+def states_of_both(pair: Pair) -> tuple[State, ...]:
     """Return the states of a solution at levels that the reference also has; all without a reference.
 
     Raises OutputError if there is no level above zero that both have.
     """
+    solution, over = pair.solution, pair.over
     if over is None:
         return solution.states
     if not isinstance(over, Solution):

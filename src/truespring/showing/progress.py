@@ -6,9 +6,11 @@ The verbs of the library know callbacks only. Each function here yields the call
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from html import escape
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, TypeVar
+
+Callback = TypeVar("Callback", bound=Callable[..., None])
 
 # Shortest interval between updates in a notebook [s].
 _EVERY = 0.1
@@ -50,6 +52,15 @@ def rows() -> Iterator[Rows | None]:
             display.close()
 
 
+def chosen(
+    progress: bool | Callback | None, shown: Callable[[], AbstractContextManager[Callback | None]]
+) -> AbstractContextManager[Callback | None]:
+    """Return the context of the argument `progress` of a verb: True shows a bar, a callback is called instead."""
+    if isinstance(progress, bool):
+        return shown() if progress else nullcontext()
+    return nullcontext(progress)
+
+
 @contextmanager
 def bars() -> Iterator[Callable[[str, str, float], None] | None]:
     """Yield a callback that shows the share of the load that a model of a study has reached."""
@@ -58,6 +69,26 @@ def bars() -> Iterator[Callable[[str, str, float], None] | None]:
             yield None
             return
         yield lambda study, model, share: display.show(f"{study}: {model}", share, 1.0)
+
+
+@contextmanager
+def steps(what: str) -> Iterator[Callable[[str, float], None] | None]:
+    """Yield a callback that shows the current step and the share of the work done."""
+    with rows() as display:
+        if display is None:
+            yield None
+            return
+        yield lambda step, share: display.show(what, share, 1.0, f"{share:.0%}, {step}")
+
+
+@contextmanager
+def paths() -> Iterator[Callable[[str, int, int], None] | None]:
+    """Yield a callback that shows the path that was solved, and how many are solved and needed so far."""
+    with rows() as display:
+        if display is None:
+            yield None
+            return
+        yield lambda path, done, needed: display.show("paths", done, needed, f"{done} of {needed}: {path}")
 
 
 @contextmanager

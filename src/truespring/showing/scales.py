@@ -35,20 +35,15 @@ def colors_of(paint: Paint) -> "Colormap":
 
 
 def range_of(paint: Paint) -> "Normalize":
-    """Return the range of the values: from zero, or the same to both sides of the middle."""
+    """Return the range of the colours."""
     from matplotlib.colors import Normalize
 
-    known = paint.values[np.isfinite(paint.values)]
-    if paint.middle is None:
-        return Normalize(0.0, float(known.max(initial=0.0)) or 1.0)
-    far = float(np.abs(known - paint.middle).max(initial=0.0)) or 1.0
-    return Normalize(paint.middle - far, paint.middle + far)
+    return Normalize(*paint.limits)
 
 
 def add_bar(axes: "Axes", drawn: Any, paint: Paint) -> None:
     """Add a colour bar as high as the axes, with the name of the quantity and its unit."""
-    norm = range_of(paint)
-    scale = natural_scale(max(abs(float(norm.vmin or 0.0)), abs(float(norm.vmax or 0.0))), paint.unit)
+    scale = natural_scale(float(np.abs(paint.limits).max()), paint.unit)
     figure: Any = axes.figure
     bar = figure.colorbar(drawn, cax=axes.inset_axes((1.03, 0.0, 0.03, 1.0)), format=formatter(scale.size))
     bar.set_label(paint.label if scale.unit == "-" else f"{paint.label} [{scale.unit}]")

@@ -23,6 +23,7 @@ class Scene:
         rest, mine, theirs: the body undeformed and deformed, and the reference; None if there is none.
         paint: values that are drawn as colours, None for one colour.
         tools: tools and grasps.
+        frame: lower and upper corner of what is shown [m], shape (2,); by default as `box`.
     """
 
     mesh: Mesh
@@ -31,6 +32,7 @@ class Scene:
     theirs: Shape | None = None
     paint: Paint | None = None
     tools: Sequence[Drawn] = ()
+    frame: tuple[Floats, Floats] | None = None
 
     @property
     def is_plane(self) -> bool:
@@ -40,6 +42,8 @@ class Scene:
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
         """Lower and upper corner of what is shown in the picture plane [m], shape (2,), with a margin."""
+        if self.frame is not None:
+            return self.frame
         own = [one.points[:, :2] for one in (self.rest, self.mine) if one is not None]
         others = [] if self.theirs is None else [self.theirs.points[:, :2]]
         lower, upper, _ = picture_box(np.concatenate(own), others)

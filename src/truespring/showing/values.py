@@ -20,7 +20,7 @@ from truespring.report.verdict import verdict
 from truespring.report.young import Known, young_figure
 from truespring.showing.cards import Card, png_of_axes, png_of_sheet
 from truespring.showing.meshes import plot_mesh
-from truespring.showing.pairs import result_of
+from truespring.showing.pairs import Pair
 from truespring.showing.plotting import plot_solution
 from truespring.showing.problems import undeformed_sheet
 from truespring.solution import FINE, Solution
@@ -67,7 +67,7 @@ def _solution_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     yield "status", str(solution.status) if fine else f"{solution.status}: {solution.status.advice}"
     if not solution.states:
         return
-    axis = axis_of(result_of(solution, None))
+    axis = axis_of(Pair(solution).result)
     yield "reached", f"{axis.exact(solution.load_factor)}, {len(solution.states)} levels"
     last = solution.states[-1]
     yield "largest displacement", quantity(float(abs(last.displacement).max()), "m")

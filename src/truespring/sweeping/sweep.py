@@ -1,5 +1,6 @@
 """A sweep: one study with many values, each point solved once."""
 
+import logging
 import math
 import os
 import tempfile
@@ -12,6 +13,7 @@ from typing import Any
 from truespring.errors import TruespringError
 from truespring.outputs import Lock
 from truespring.report.summary import summary
+from truespring.showing.progress import chosen, counting
 from truespring.study import StudyText, read_text, run
 from truespring.study.changes import changed
 from truespring.sweeping.here import run_here
@@ -24,6 +26,8 @@ from truespring.sweeping.values import make_changes, read_points
 #: Called with the number of finished points, of failed ones, and of all.
 Progress = Callable[[int, int, int], None]
 
+
+_LOGGER = logging.getLogger(__name__)
 
 # A worker is killed after twice the time limit of all models of a point, plus this [s].
 _GRACE = 30.0
@@ -44,6 +48,7 @@ def sweep(
     scheduler: str | None = None,
     retry_failed: bool = False,
     timeout: float | None = None,
+    progress: bool | Progress | None = True,
 ) -> Sweep:
     """Solve a study with many values of its keys.
 
@@ -63,12 +68,17 @@ def sweep(
         scheduler: address of a Dask cluster to use instead.
         retry_failed: whether to solve failed points again.
         timeout: time limit of each model [s]; None is no limit.
+        progress: whether to show a progress bar in a notebook or terminal; or a callback with the
+            number of finished points, of failed ones, and of all.
     """
     plan = plan_sweep(study, vary, lhs, seed, points)
-    if out is None:
-        with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
-            return run_sweep(plan, Path(folder), workers, scheduler, timeout=timeout)
-    done = run_sweep(plan, Path(out), workers, scheduler, retry_failed=retry_failed, timeout=timeout)
+    with chosen(progress, lambda: counting("points")) as advance:
+        if out is None:
+            with tempfile.TemporaryDirectory(prefix="truespring-") as folder:
+                return run_sweep(plan, Path(folder), workers, scheduler, timeout=timeout, progress=advance)
+        done = run_sweep(
+            plan, Path(out), workers, scheduler, retry_failed=retry_failed, timeout=timeout, progress=advance
+        )
     write_sweep(done, Path(out))
     return done
 
@@ -155,6 +165,7 @@ class _Tally:
             self.count()
 
     def count(self) -> None:
+        _LOGGER.info("%d of %d points, %d failed", len(self.records), len(self.plan.points), self.n_failed)
         if self.progress:
             self.progress(len(self.records), self.n_failed, len(self.plan.points))
 

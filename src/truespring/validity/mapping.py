@@ -11,6 +11,7 @@ import numpy as np
 
 from truespring.errors import StudyError, TruespringError, nearest
 from truespring.models import LAWS
+from truespring.showing.progress import chosen, paths
 from truespring.study import Study, read_study, require_last_level
 from truespring.sweeping import Failure, Pool
 from truespring.validity.axes import NAMES, Range, axis_of, check_axes, known, range_of, sizes_to
@@ -46,7 +47,7 @@ def map_validity(
     workers: int | None = 1,
     scheduler: str | None = None,
     threads: int = 1,
-    progress: Progress | None = None,
+    progress: bool | Progress | None = True,
 ) -> Validity:
     """Map the error of a study's springs against FEM by load level, mesh, material, rule or load type.
 
@@ -63,7 +64,8 @@ def map_validity(
         workers: number of processes on this machine; 1 solves in this process, None uses the number of cores.
         scheduler: address of a Dask cluster to use instead.
         threads: threads of each worker.
-        progress: called with the path that was solved, the number of solved paths, and the number needed so far.
+        progress: whether to show a progress bar in a notebook or terminal; or a callback with the
+            path that was solved, the number of solved paths, and the number needed so far.
 
     Raises StudyError for invalid arguments or combinations of them.
     """
@@ -76,7 +78,8 @@ def map_validity(
         pool = None
         if workers != 1 or scheduler is not None:
             pool = stack.enter_context(Pool(None if scheduler else workers, scheduler, threads=threads))
-        run = _Run(read, law, loads, rules, x, y, ranges or {}, adaptive, pool, progress)
+        advance = stack.enter_context(chosen(progress, paths))
+        run = _Run(read, law, loads, rules, x, y, ranges or {}, adaptive, pool, advance)
         maps = tuple(run.maps())
     return Validity(
         title=read.title,
