@@ -2,7 +2,8 @@
 A cantilever under its own weight
 =================================
 
-A soft beam sags under gravity by more than half of its length. Its shape is that of the heavy elastica.
+A soft beam sags under gravity by more than half of its length. Its shape is that of the
+heavy elastica.
 """
 
 import matplotlib.pyplot as plt
@@ -23,22 +24,37 @@ problem = ts.Problem(
     supports=ts.Fixed("left"),
     loads=ts.Gravity((0.0, -gravity)),
 )
-springs = ts.solve(problem, ts.Springs(rule="gaussian", element="quadratic"), ts.Newton(load_steps=8))
+springs = ts.solve(
+    problem, ts.Springs(rule="gaussian", element="quadratic"), ts.Newton(load_steps=8)
+)
 
 # %%
-# The slope a of the heavy elastica along its length s satisfies EI a'' = -w (L - s) cos(a), with the weight w per
-# length, a(0) = 0 and a'(L) = 0: it is clamped at one end, and has no moment at the other.
-stiffness, weight = young * thickness * depth**3 / 12, density * gravity * depth * thickness
+# The slope a of the heavy elastica along its length s satisfies EI a'' = -w (L - s)
+# cos(a), with the weight w per length, a(0) = 0 and a'(L) = 0: it is clamped at one
+# end, and has no moment at the other.
+stiffness, weight = (
+    young * thickness * depth**3 / 12,
+    density * gravity * depth * thickness,
+)
 
 
 def bends(s, y):
     angle, curvature, _, _ = y
-    return np.stack([curvature, -weight / stiffness * (length - s) * np.cos(angle), np.cos(angle), -np.sin(angle)])
+    return np.stack(
+        [
+            curvature,
+            -weight / stiffness * (length - s) * np.cos(angle),
+            np.cos(angle),
+            -np.sin(angle),
+        ]
+    )
 
 
 along = np.linspace(0, length, 101)
 start = np.stack([along / length, np.ones(101) / length, along, -along / 2])
-beam = solve_bvp(bends, lambda a, b: np.array([a[0], b[1], a[2], a[3]]), along, start, tol=1e-8)
+beam = solve_bvp(
+    bends, lambda a, b: np.array([a[0], b[1], a[2], a[3]]), along, start, tol=1e-8
+)
 assert beam.success
 x, y = beam.sol(along)[2:]
 

@@ -2,7 +2,8 @@
 Where springs can be trusted
 ============================
 
-A validity map shows up to which load springs agree with converged finite elements, on coarse and fine meshes.
+A validity map shows up to which load springs agree with converged finite elements, on
+coarse and fine meshes.
 """
 
 from pathlib import Path
@@ -17,7 +18,9 @@ import truespring as ts
 # The body is that of ``truespring new strip``; it is bent as a cantilever.
 with TemporaryDirectory() as folder:
     study = ts.read_study(ts.new("strip", Path(folder) / "strip.toml"))
-    found = ts.map_validity(study, loads=["bend"], rules=["lloyd", "gaussian"], ranges={"depth": (1, 6)})
+    found = ts.map_validity(
+        study, loads=["bend"], rules=["lloyd", "gaussian"], ranges={"depth": (1, 6)}
+    )
 for verdict in found.verdicts:
     print(verdict)
 print(f"{found.solves[0]} paths of springs were solved")
