@@ -15,7 +15,8 @@ from truespring.study import read_study, run
 from truespring.study.schema import MODEL_KINDS, StudyKeys
 
 ROOT = EXAMPLES.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "export").glob("*.md"))]
+SECTIONS = ("", "export", "howto", "coming-from")
+PAGES = [ROOT / "README.md", *(page for one in SECTIONS for page in sorted((ROOT / "docs" / one).glob("*.md")))]
 
 
 def blocks(language: str) -> list[tuple[str, str]]:
@@ -29,19 +30,27 @@ def blocks(language: str) -> list[tuple[str, str]]:
     ]
 
 
+def in_section(page: str) -> bool:
+    """Return whether a page is one of many of a section: its code runs in verification, see also test_pages.py."""
+    return page.startswith(("docs/howto/", "docs/coming-from/"))
+
+
 def test_the_pages_hold_code() -> None:
     assert len(blocks("python")) >= 2
     assert len(blocks("toml")) >= 2
 
 
-@pytest.mark.parametrize(("page", "code"), blocks("python"))
+@pytest.mark.parametrize(
+    ("page", "code"),
+    [pytest.param(*one, marks=[pytest.mark.verification] if in_section(one[0]) else []) for one in blocks("python")],
+)
 def test_python_on_the_pages_runs(page: str, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # some write files
     shutil.copytree(EXAMPLES, tmp_path / "examples")  # as where one stands in the project
     exec(compile(code, page, "exec"), {})
 
 
-@pytest.mark.parametrize(("page", "text"), blocks("toml"))
+@pytest.mark.parametrize(("page", "text"), [one for one in blocks("toml") if not in_section(one[0])])
 def test_studies_on_the_pages_run(page: str, text: str, tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
     file.write_text(text, encoding="utf-8")
