@@ -233,7 +233,7 @@ def test_an_animation_has_a_frame_for_each_level(springs: ts.Solution, finite: t
             film.seek(number)
             pixels = np.asarray(film.convert("RGB")).astype(int)[:, : int(0.8 * film.width)]  # without the bar
             seen.append((np.abs(pixels - [253, 231, 37]).max(axis=-1) < 40).sum())
-        assert seen[0] == 0 and seen[-1] > 50
+        assert seen[:-1] == [0, 0] and seen[-1] > 50
     with pytest.raises(OutputError, match=r"the suffix of an animation is \.gif or \.mp4, not '\.avi'"):
         springs.animate(tmp_path / "springs.avi")
     surface = ts.read_stl(springs.problem, springs.write(tmp_path / "springs.stl"))
