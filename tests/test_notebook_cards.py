@@ -2,8 +2,12 @@
 
 import base64
 import io
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -153,3 +157,45 @@ def test_a_terminal_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     with ts.ProgressBar("a [b]") as bar:
         bar(0.5, 3, 1e-3)
     assert "a [b]" in screen.getvalue() and "iteration 3, residual 1e-03" in screen.getvalue()
+
+
+def test_a_comparison_with_markers_shows_the_springs_themselves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not the springs at the markers, which are a cloud of points."""
+    file = tmp_path / "markers.csv"
+    file.write_text("x [mm],y [mm],ux [mm],uy [mm]\n60,5,-1,-5\n20,12,0,-1\n", encoding="utf-8")
+    problem = ts.Problem(
+        mesh=ts.rectangle(size=(0.08, 0.02), elements=(4, 1)),
+        material=ts.Material(young=1e4, poisson=0.3),
+        section=ts.PlaneStress(thickness=0.01),
+        supports=[ts.Fixed(on="left")],
+        loads=[ts.Force(on="right", total=(0.0, -0.01))],
+    )
+    springs, markers = ts.solve(problem, ts.Springs(rule="gaussian")), ts.read_result(file)
+    drawn = []
+
+    def plot(solution: ts.Solution, over: ts.Solution, *options: object) -> Any:
+        drawn.append((solution, over))
+        return solution.plot(over=over)
+
+    monkeypatch.setattr("truespring.showing.values.plot_solution", plot)
+    assert Read(ts.compare(springs, markers)._repr_html_()).pictures
+    assert drawn == [(springs, markers)]
+
+
+@pytest.mark.verification
+def test_the_first_card_of_a_notebook_leaves_the_interactive_mode_on(tmp_path: Path) -> None:
+    """The backend of notebooks turns it on when pyplot loads it, which may be while a card is drawn."""
+    (tmp_path / "late.py").write_text(
+        "import matplotlib\nfrom matplotlib.backends.backend_agg import *\nmatplotlib.interactive(True)\n", "utf-8"
+    )
+    code = (
+        "import matplotlib\nfrom matplotlib import pyplot\nfrom truespring.showing.cards import png_of_axes\n"
+        "assert not matplotlib.is_interactive()\n"
+        "png_of_axes(lambda: pyplot.subplots()[1])\nassert matplotlib.is_interactive()\n"
+    )
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "MPLBACKEND": "module://late", "PYTHONPATH": path}, check=True
+    )

@@ -7,6 +7,7 @@ import base64
 import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -92,6 +93,7 @@ def png_of_axes(draw: Callable[[], "Axes"]) -> bytes:
     from matplotlib import pyplot
     from PIL import Image
 
+    _load_backend()
     with pyplot.ioff():
         figure = draw().get_figure(root=True)
         assert figure is not None  # axes that were just made
@@ -101,6 +103,14 @@ def png_of_axes(draw: Callable[[], "Axes"]) -> bytes:
         finally:
             pyplot.close(figure)
     return _small(Image.open(file))
+
+
+@cache
+def _load_backend() -> None:
+    """Load the backend of pyplot, once: that of a notebook turns the interactive mode on, which `ioff` would undo."""
+    from matplotlib import pyplot
+
+    pyplot.switch_backend(pyplot.get_backend())
 
 
 def png_of_sheet(sheet: Sheet) -> bytes:
