@@ -14,15 +14,13 @@ import truespring as ts
 mu, poisson, radius, length, angle = 1e5, 0.49, 0.01, 0.04, np.radians(120)
 
 # %%
-# A square of n by n elements is mapped to a disc: rings of squares become circles.
-# Hexahedra stand on it.
+# A bar of squares becomes round: its rings of elements become circles, the more the
+# nearer they are to the surface.
 box = ts.box((2.0, length, 2.0), (8, 8, 8))
 x, y, z = (box.nodes - (1, 0, 1)).T
 ring = np.maximum(np.abs(x), np.abs(z))
-roundness = ring / np.maximum(np.hypot(x, z), 1e-12)  # brings a square ring to a circle
-scale = radius * (
-    ring * roundness + (1 - ring) * 0.8
-)  # squares near the axis, circles at the surface
+circle = ring / np.maximum(np.hypot(x, z), 1e-12)
+scale = radius * (ring * circle + (1 - ring) * 0.8)
 bar = ts.Mesh(np.stack([scale * x, y, scale * z], axis=1), box.elements, "hexahedron")
 
 problem = ts.Problem(

@@ -16,7 +16,8 @@ import truespring as ts
 radius, drop, gravity = 0.03, 0.10, 9.81
 
 # %%
-# A square of elements is mapped to a disc: rings of squares become circles.
+# A square of elements becomes a disc: its rings become circles, the more the nearer
+# they are to the edge.
 square = ts.rectangle((2.0, 2.0), (10, 10))
 x, y = (square.nodes - 1).T
 ring = np.maximum(np.abs(x), np.abs(y))
