@@ -200,3 +200,19 @@ def test_the_view_in_space_is_coloured_cut_and_read(pages: dict[str, Path], brow
         found = found or words.inner_text().startswith("node")
     assert found
     opened.close()
+
+
+def test_the_plane_view_is_coloured_and_read(pages: dict[str, Path], browser: Any, tmp_path: Path) -> None:
+    opened = Opened(browser, pages["strip"], has_touch=True)
+    canvas, words = opened.page.locator("figure.viewer canvas"), opened.page.locator("output.node")
+    opened.page.select_option("select[name=color]", "displacement")
+    colours = {pixel for _, pixel in opened.picture(tmp_path).getcolors(10**6)}
+    assert any(red > 220 and 100 < green < 200 for red, green, _ in colours)  # orange, in the middle of the range
+    canvas.focus()
+    for _ in range(3):
+        opened.page.keyboard.press("n")
+    assert words.inner_text().startswith("node 2")
+    box = canvas.bounding_box()
+    opened.page.touchscreen.tap(box["x"] + 2, box["y"] + box["height"] - 2)
+    assert words.inner_text().startswith("Point at a node")
+    opened.close()

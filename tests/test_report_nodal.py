@@ -48,6 +48,44 @@ def test_fields_of_a_bar(model: Model, element: str) -> None:
     assert fields["energy"] == pytest.approx(state.energy / np.prod(SIZE), rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    "model", [ts.Springs("lloyd"), ts.Springs("gaussian"), ts.Fem("linear")], ids=lambda one: one.kind
+)
+def test_fields_of_a_strip(model: Model) -> None:
+    """In plane stress; the thickness of springs does not change, that of linear elements is the undeformed one."""
+    problem = ts.Problem(
+        ts.rectangle((0.08, 0.02), (4, 1)),
+        ts.Material(1e4, 1 / 3),
+        ts.PlaneStress(0.01),
+        [ts.Fixed("left", ("x",)), ts.Fixed("bottom", ("y",))],
+        [ts.Force("right", (0.4, 0.0))],
+    )
+    path = ts.solve(problem, model, ts.Newton(load_steps=2))
+    state = path.states[-1]
+    wide, high = np.ptp(state.positions, axis=0)
+    fields = node_fields(path, state)
+    assert fields["stretch"] == pytest.approx(wide / 0.08, rel=1e-6)
+    assert fields["energy"] == pytest.approx(state.energy / (0.08 * 0.02 * 0.01), rel=1e-6)
+    if not path.finite:
+        assert fields["stress"] == pytest.approx(0.4 / (0.02 * 0.01), rel=1e-6)
+    elif model.rule == "lloyd":
+        assert fields["stress"] == pytest.approx(0.4 / (high * 0.01), rel=1e-6)
+    else:  # the thickness shrinks as the width does
+        assert fields["stress"] == pytest.approx(0.4 / (high * 0.01 * high / 0.02), rel=1e-6)
+
+
+def test_stress_of_springs_is_not_known_in_plane_strain() -> None:
+    problem = ts.Problem(
+        ts.rectangle((0.08, 0.02), (4, 1)),
+        ts.Material(1e4, 1 / 3),
+        ts.PlaneStrain(0.01),
+        [ts.Fixed("left")],
+        [ts.Force("right", (0.4, 0.0))],
+    )
+    path = ts.solve(problem, ts.Springs("lloyd"), ts.Newton(load_steps=1))
+    assert set(node_fields(path, path.states[-1])) == {"stretch", "energy"}
+
+
 def test_energy_and_stress_are_not_known_where_springs_have_a_part_of_them() -> None:
     path = pulled(ts.Springs("isotropic", volume=True), 0.4)
     assert set(node_fields(path, path.states[-1])) == {"stretch"}

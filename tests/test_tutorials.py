@@ -1,4 +1,4 @@
-"""The tutorials: each is a notebook of which all cells are Python, with links that lead somewhere; the long test runs it."""
+"""The tutorials: each is a notebook of Python cells, with links that lead somewhere; the long test runs it."""
 
 import ast
 import re

@@ -126,32 +126,6 @@ window.truespringScene = (canvas, data, bar) => {
     cap.geometry.setAttribute("color", colors);
   }
 
-  // --- values at the nodes ----------------------------------------------------------------------------------------
-
-  // Words, unit, range and the value of node i of what colours stand for, on the model or on the reference.
-  function quantity(name) {
-    const { reference, mine: a, theirs: b } = shown, path = shown.other ? reference : model, own = shown.other ? b : a;
-    const length = longest / 65535 / data.factor, apart = (p, q) => (i) => length * Math.hypot(p[3 * i] - q[3 * i], p[3 * i + 1] - q[3 * i + 1], p[3 * i + 2] - q[3 * i + 2]);
-    if (name === "distance") {
-      if (!b) return null;
-      const far = reference.farthest;
-      return { title: `distance from ${reference.label}`, unit: data.unit, low: 0, high: far ? length * far.steps : 0, words: far ? far.words : "0", value: apart(a, b) };
-    }
-    if (!own) return null;
-    const of = ` of ${path.label}`;
-    if (name === "displacement") return { title: name + of, unit: data.unit, low: 0, high: length * largest, value: apart(own, data.rest) };
-    const field = data.fields.find((one) => one.name === name), level = path.levels.findIndex((one) => Math.abs(one - model.levels[shown.level]) < 1e-9);
-    const steps = path.fields[name] && path.fields[name][level];
-    return field && steps ? { ...field, title: field.label + of, value: (i) => field.low + ((field.high - field.low) * steps[i]) / field.steps } : null;
-  }
-
-  // The largest displacement of all paths that stay in the picture, in steps.
-  const largest = Math.max(1e-9, ...data.paths.filter((path) => !path.beyond).flatMap((path) => path.positions.map((p) => {
-    let most = 0;
-    for (let i = 0; i < p.length; i += 3) most = Math.max(most, Math.hypot(p[i] - data.rest[i], p[i + 1] - data.rest[i + 1], p[i + 2] - data.rest[i + 2]));
-    return most;
-  })));
-
   // --- drawing --------------------------------------------------------------------------------------------------
 
   let shown = null;
@@ -162,10 +136,9 @@ window.truespringScene = (canvas, data, bar) => {
     mine.needsUpdate = true;
     if (known) theirs.array.set(metric(shown.theirs));
     theirs.needsUpdate = true;
-    shown.other = known && shown.ticked.includes("other") && shown.color !== "distance";
-    const colours = corners.count && shown.color ? quantity(shown.color) : null, apart = colours !== null;
+    const colours = corners.count && shown.color ? data.ask.quantity(shown.color, shown) : null, apart = colours !== null;
     const [own, opposite] = shown.other ? [theirs, mine] : [mine, theirs];
-    const share = (i) => (colours && colours.high > colours.low ? (colours.value(i) - colours.low) / (colours.high - colours.low) : 0);
+    const share = colours && data.ask.share(colours);
     if (apart) shade(shades, data.colors, share);
     for (const one of cuttable) one.clippingPlanes = null;
     const cap = apart ? colouredCap : plainCap;
@@ -173,7 +146,7 @@ window.truespringScene = (canvas, data, bar) => {
     if (shown.cut) {
       cut(shown.cut);
       cap.visible = data.tetrahedra.length > 0;
-      if (cap.visible) fill(cap, own.array, share);
+      if (cap.visible) fill(cap, own.array, share || (() => 0));
     }
     for (const [path, lines] of black) {
       lines.visible = known && !apart && path === reference && lines.lines.length > 0;
@@ -223,11 +196,9 @@ window.truespringScene = (canvas, data, bar) => {
     spot(context, view.pixel(probe(shown.mine)), RED, "#fff");
     view.rule();
     if (shown.node >= 0) spot(context, view.pixel(metric(shown.mine.slice(3 * shown.node, 3 * shown.node + 3))), "#ffd23f", INK, 5.5);
-    const { colours } = shown;
-    if (colours) legend(context, data.colors, colours.title, colours.words || written(colours.high, colours.unit), width, written(colours.low, ""));
+    const { colours } = shown, { written } = data.ask;
+    if (colours) legend(context, data.colors, colours.title, written(colours.high, colours.unit), width, written(colours.low, ""));
   }
-
-  const written = (value, unit) => `${+value.toPrecision(3)}${unit && " " + unit}`;
 
   // The nodes on the surface, and the one of them at a pixel that is nearest to the eye; -1 without one.
   const candidates = corners.count ? [...new Set(data.triangles)].sort((a, b) => a - b) : [...Array(data.n_nodes).keys()];
@@ -240,14 +211,6 @@ window.truespringScene = (canvas, data, bar) => {
     }
     const front = Math.max(...found.map((one) => one.depth)) - 0.03;
     return found.filter((one) => one.depth >= front).reduce((best, one) => (one.away < best.away ? one : best), { i: -1, away: Infinity }).i;
-  }
-
-  // What is known of a node besides its displacement.
-  function values(node) {
-    return ["distance", ...data.fields.map((field) => field.name)].map((name) => {
-      const known = quantity(name);
-      return known && `${known.label || known.title} ${written(known.value(node), known.unit)}`;
-    }).filter(Boolean);
   }
 
   const probe = (steps) => metric(steps.slice(3 * data.probe, 3 * data.probe + 3));
@@ -269,5 +232,5 @@ window.truespringScene = (canvas, data, bar) => {
   const size = (width) => shown && Math.round(Math.max(Math.min(width, 340), Math.min(0.6 * width, 0.62 * innerHeight, 540)));
   const scenes = [back, front, top];
   const view = createView(canvas, renderer, { scenes, strokes, include, size, render, marks, bar, unit: data.unit, longest });
-  return Object.assign(paint, { pick, values, candidates });
+  return Object.assign(paint, { pick, candidates });
 };

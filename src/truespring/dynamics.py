@@ -20,6 +20,11 @@ class Damping:
     Attributes:
         stiffness: time of the dashpot beside each spring or element, of its viscosity over its stiffness [s].
         mass: force against the velocity over mass [1/s]; it brakes a free fall, too.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Damping(stiffness=0.002, mass=0.5)
+        Damping(stiffness=0.002, mass=0.5)
     """
 
     stiffness: float = 0.0
@@ -51,6 +56,19 @@ class Dynamics:
         accuracy: with `step` "auto", the largest error of a step over the largest displacement [-].
         creep: speed at which regularised friction is full [m/s]; None for 0.001 sqrt(g L), L the size of the body.
         substeps: number of parts that each step is divided into, to estimate the error of the step.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3, density=1000.0),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Gravity((0.0, -9.81))],
+        ...     dynamics=ts.Dynamics(duration=0.05),
+        ... )
+        >>> ts.solve(problem, ts.Springs("gaussian")).states[-1].load_factor
+        1.0
     """
 
     duration: float

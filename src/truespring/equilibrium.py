@@ -67,6 +67,21 @@ def solve(
     Solver failures are not exceptions: see Solution.status and Solution.best. An exception of a numerical library ends
     the solution at the last equilibrium. Raises ModelError if the model does not fit the problem, ProblemError if the
     solver does not.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> solution = ts.solve(problem, ts.Springs("gaussian"))
+        >>> solution
+        Solution(springs (gaussian), converged, 11 states up to load factor 1)
+        >>> solution.states[-1].displacement.shape
+        (10, 2)
     """
     model, solver = as_model(model), Newton() if solver is None else as_solver(solver)
     check_fibres(problem, model)

@@ -5,7 +5,16 @@ from collections.abc import Iterable
 
 
 class TruespringError(Exception):
-    """Base class: the input is wrong; the message names the value, its place and a remedy."""
+    """Base class: the input is wrong; the message names the value, its place and a remedy.
+
+    Example:
+        >>> import truespring as ts
+        >>> try:
+        ...     ts.rectangle((0.16, -0.04), (16, 4))
+        ... except ts.TruespringError as error:
+        ...     print(error)
+        size = [0.16, -0.04]: lengths must be positive and finite
+    """
 
 
 class StudyError(TruespringError):

@@ -28,6 +28,11 @@ class Fibres:
             families.
         k1: stiffness [Pa], not negative; 0 for fibres without stiffness, which may have an active tension.
         k2: increase of the stiffness with the stretch [-], not negative; requires k1 above 0.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Fibres(along=(1.0, 0.0), k1=5e3, k2=10.0).words()
+        'fibres along (1, 0), k1 = 5000 Pa, k2 = 10'
     """
 
     along: str | Sequence[float] | Sequence[str | Sequence[float]]

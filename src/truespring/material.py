@@ -35,6 +35,13 @@ class Material:
         constants: further constants of constitutive laws by name [SI], as a mapping or pairs, stored as sorted pairs.
             The entries of LAWS define them; a law ignores the constants of other laws.
         fibres: fibres whose energy is added to that of the law; None without.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Material(young=10e3, poisson=0.45, density=1000.0).density
+        1000.0
+        >>> ts.Material(young=10e3, poisson=0.45, constants={"jm": 30.0}).constants
+        (('jm', 30.0),)
     """
 
     young: float
@@ -130,7 +137,13 @@ class Section(ABC):
 
 @dataclass(frozen=True, slots=True)
 class PlaneStress(Section):
-    """A thin body that changes its thickness freely."""
+    """A thin body that changes its thickness freely.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.PlaneStress(thickness=0.01).apparent_moduli(ts.Material(young=10e3, poisson=0.3))
+        (10000.0, 0.3)
+    """
 
     key: ClassVar[str] = "plane-stress"
     free_thickness: ClassVar[bool] = True
@@ -148,7 +161,14 @@ class PlaneStress(Section):
 
 @dataclass(frozen=True, slots=True)
 class PlaneStrain(Section):
-    """A slice of a long body, of constant thickness."""
+    """A slice of a long body, of constant thickness.
+
+    Example:
+        >>> import truespring as ts
+        >>> young, poisson = ts.PlaneStrain(thickness=0.01).apparent_moduli(ts.Material(young=10e3, poisson=0.3))
+        >>> round(young, 1), round(poisson, 4)  # E / (1 - nu^2), nu / (1 - nu)
+        (10989.0, 0.4286)
+    """
 
     key: ClassVar[str] = "plane-strain"
     moduli_words: ClassVar[str] = "E / (1 - nu^2) and nu / (1 - nu)"

@@ -44,6 +44,12 @@ class Region:
     """Elements of another `material`.
 
     `on` is an element group of the mesh, a Box that contains the centres of the elements, or element numbers.
+
+    Example:
+        >>> import truespring as ts
+        >>> stiff = ts.Region(ts.Box((0.0, 0.0), (0.02, 0.01)), ts.Material(young=50e3, poisson=0.3))
+        >>> stiff.material.young
+        50000.0
     """
 
     on: Selection

@@ -62,6 +62,19 @@ class OwnError:
         limit: solution on the finer mesh or with elements of second order, None without one.
         comparison: comparison of the solution with `limit`, None without one.
         work: work of the estimate, see `work_of`.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> error = ts.reference_error(problem, ts.Fem("neo-hookean"))
+        >>> error.how, error.limit.problem.mesh.n_nodes
+        ('second order', 10)
     """
 
     value: float | None
@@ -104,7 +117,20 @@ def work_of(path: Solution) -> float:
 def reference_error(
     problem: Problem, model: Model, solver: Solver | None = None, most_work: float = math.inf
 ) -> OwnError:
-    """Solve a problem and return the discretisation error of its solution, see `own_error`."""
+    """Solve a problem and return the discretisation error of its solution, see `own_error`.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> print(ts.reference_error(problem, ts.Fem("neo-hookean")))
+        0.87% (second order)
+    """
     solver = Newton() if solver is None else as_solver(solver)
     return own_error(solve(problem, model, solver), model, solver, most_work)
 

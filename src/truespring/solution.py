@@ -30,7 +30,23 @@ SAME_LEVEL = 2e-6
 
 
 class Status(StrEnum):
-    """How a solution ended; `advice` explains it and suggests a remedy."""
+    """How a solution ended; `advice` explains it and suggests a remedy.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> status = ts.solve(problem, ts.Springs("gaussian")).status
+        >>> status is ts.Status.CONVERGED
+        True
+        >>> ts.Status.UNSTABLE.advice
+        'a real body would leave such a state; reduce the load, or add a small side force to choose a branch'
+    """
 
     CONVERGED = "converged"
     UNSTABLE = "unstable"
@@ -89,6 +105,21 @@ class State:
         reason: why the solver did not look for equilibria beyond this state, else empty.
         touches: what each tool and grasp of the problem does, in their order; empty if not known.
         moving: time, velocity and energies of a state of a motion, None at rest.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> state = ts.solve(problem, ts.Springs("gaussian")).states[-1]
+        >>> state.load_factor, state.negative_eigenvalues
+        (1.0, 0)
+        >>> state.reaction.sum(axis=0).round(6).tolist()
+        [-0.1, 0.0]
     """
 
     load_factor: float

@@ -24,9 +24,10 @@ def new(kind: str, path: str | Path | None = None) -> str | Path:
     Returns the text, or with `path` the path of the file. Raises TruespringError for an unknown kind, another suffix
     than .toml, or if a file exists or cannot be written.
 
-    >>> import truespring as ts
-    >>> print(ts.new("strip").splitlines()[0])
-    # A soft strip in 2D, clamped on the left and bent by a force on its right end.
+    Example:
+        >>> import truespring as ts
+        >>> print(ts.new("strip").splitlines()[0])
+        # A soft strip in 2D, clamped on the left and bent by a force on its right end.
     """
     if path is None:
         return _text(kind)

@@ -74,18 +74,19 @@ def verify(
     Raises StudyError for a wrong study, ProblemError, ModelError or MeshError for wrong models or options, OutputError
     if the folder cannot be written.
 
-    >>> import truespring as ts
-    >>> problem = ts.Problem(
-    ...     mesh=ts.rectangle(size=(0.04, 0.01), elements=(4, 1)),
-    ...     material=ts.Material(young=10e3, poisson=0.3),
-    ...     section=ts.PlaneStress(thickness=0.01),
-    ...     supports=[ts.Fixed(on="left")],
-    ...     loads=[ts.Force(on="right", total=(0.1, 0.0))],
-    ... )
-    >>> models = {"springs": ts.Springs(rule="gaussian"), "fem": ts.Fem(law="neo-hookean")}
-    >>> result = ts.verify(problem, models=models)
-    >>> result.comparison.rms_error < 0.01
-    True
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> models = {"springs": ts.Springs("gaussian"), "fem": ts.Fem("neo-hookean")}
+        >>> result = ts.verify(problem, models=models)
+        >>> f"{result.comparison.rms_error:.1%}"
+        '0.6%'
     """
     options = {"solver": solver, "probe": probe, "tolerance": tolerance, "refine": refine, "title": title}
     case = _case(study, models, {key: value for key, value in options.items() if value is not None})

@@ -24,12 +24,10 @@ class Report:
         versions: by name of the package; "not installed" for a missing one.
         machine: by name: system, processor, cores, memory, threads of numba, libraries of linear algebra.
 
-    >>> import truespring as ts
-    >>> report = ts.Report()
-    >>> report.versions["truespring"] == ts.__version__
-    True
-    >>> print(report)  # doctest: +ELLIPSIS
-    truespring    ...
+    Example:
+        >>> import truespring as ts
+        >>> ts.Report().versions["truespring"] == ts.__version__
+        True
     """
 
     versions: dict[str, str] = field(default_factory=lambda: _versions())

@@ -55,6 +55,22 @@ def calibrate(
             current step and the share of the work done.
 
     Raises ModelError or ProblemError if springs, unknowns or cases do not fit together.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> reference = ts.solve(problem, ts.Fem("neo-hookean"))
+        >>> case = ts.LoadCase("pulled", problem, reference)
+        >>> found = ts.calibrate(case, ts.Springs("isotropic"), regularisation=0.0, evaluations=3)
+        >>> fitted = found.cases[0]
+        >>> bool(fitted.error(fitted.after, "displacement") < fitted.error(fitted.before, "displacement"))
+        True
     """
     fitted, tested = _several(cases), _several(held_out)
     if not fitted:

@@ -65,6 +65,20 @@ class LoadCase:
         field: the reference as full field on the nodes of the problem; None if it is not one.
 
     Raises ProblemError if there are no data at any load step of the solver.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> reference = ts.solve(problem, ts.Fem("neo-hookean"))
+        >>> case = ts.LoadCase("pulled", problem, reference)
+        >>> case.name
+        'pulled'
     """
 
     name: str

@@ -54,6 +54,22 @@ def read_curve(file: str | Path, problem: Problem, probe: int) -> Curve:
 
     Raises ReferenceFileError, with file and line, if the file is damaged, a column is missing, or load factors do not
     ascend.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> with open("test.csv", "w") as file:
+        ...     for line in ("ux [mm],fx [N]", "0,0", "2,0.05", "5,0.1"):
+        ...         print(line, file=file)
+        >>> curve = ts.read_curve("test.csv", problem, probe=ts.named_point(problem.mesh, "right-middle"))
+        >>> curve.load_factors.tolist(), curve.values.ravel().tolist()
+        ([0.0, 0.5, 1.0], [0.0, 0.002, 0.005])
     """
     place = Path(file)
     data = Columns(place, _COLUMNS, (), ReferenceFileError)

@@ -132,7 +132,23 @@ def _finite(value: float) -> float | None:
 
 
 def draw_calibration(found: Fitted) -> dict[str, Drawing]:
-    """Return the figures of a calibration as PNG and SVG; deprecated, use `Calibration.figures`."""
+    """Return the figures of a calibration as PNG and SVG; deprecated, use `Calibration.figures`.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> reference = ts.solve(problem, ts.Fem("neo-hookean"))
+        >>> case = ts.LoadCase("pulled", problem, reference)
+        >>> found = ts.calibrate(case, ts.Springs("isotropic"), evaluations=1)
+        >>> found.figures()["calibration_errors"].title
+        'Error at full load: grey by the rule, blue calibrated'
+    """
     warnings.warn("draw_calibration is deprecated, use Calibration.figures()", DeprecationWarning, stacklevel=2)
     return drawings(calibration_figures(found))
 

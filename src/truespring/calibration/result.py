@@ -20,7 +20,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Fitted):
-    """Springs fitted to references; the attributes are those of `Fitted`."""
+    """Springs fitted to references; the attributes are those of `Fitted`.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> reference = ts.solve(problem, ts.Fem("neo-hookean"))
+        >>> case = ts.LoadCase("pulled", problem, reference)
+        >>> found = ts.calibrate(case, ts.Springs("isotropic"), evaluations=1)
+        >>> found.held_out, found.unknowns.kind
+        ((), 'class')
+    """
 
     def __repr__(self) -> str:
         return f"Calibration({self.headline})"

@@ -39,6 +39,13 @@ def converge(
         progress: called with the refined study and the name of a model before it is solved.
 
     Raises StudyError if the mesh cannot be refined, or the study is a motion or returns before its end.
+
+    Example:
+        >>> import truespring as ts
+        >>> study = ts.read_study(ts.new("strip", "strip.toml"), **{"mesh.elements": [4, 1], "solver.load_steps": 2})
+        >>> *_, last = ts.converge(study, most=2)
+        >>> last.n_nodes
+        (10, 27)
     """
     original = study if isinstance(study, Study) else read_study(study)
     require_last_level(original, "converge")

@@ -39,6 +39,19 @@ def export(
     the displacement of the node `probe` at full load, by default the free node that moves most; exported.json has what
     to expect, see `expectation`. Raises ExportError if the target or an option is unknown, or if the target does not
     support the model.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> files = ts.export(problem, ts.Springs("isotropic"), "obj", "out")
+        >>> [file.name for file in files]
+        ['rest.obj', 'deformed.obj', 'exported.json']
     """
     known_targets([target])
     check_options([target], options)

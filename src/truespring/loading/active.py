@@ -29,6 +29,21 @@ class ActiveTension(FollowingLoad):
     `on` is an element group, a Box that contains the centres of the elements, or element numbers; None for the whole
     body, whose elements without fibres carry none. The potential of an element is tension x volume x stretch, the
     stretch of the fibres that of the mean of I4 over the element.
+
+    Example:
+        >>> import truespring as ts
+        >>> muscle = ts.Material(young=10e3, poisson=0.3, fibres=ts.Fibres(along=(1.0, 0.0)))
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     muscle,
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.ActiveTension(2e3)],
+        ... )
+        >>> solution = ts.solve(problem, ts.Springs("gaussian"))
+        >>> end = ts.nearest_node(problem.mesh, (0.04, 0.0))
+        >>> bool(solution.states[-1].displacement[end, 0] < 0)
+        True
     """
 
     tension: float

@@ -31,6 +31,11 @@ class Force(DeadLoad):
 
     `on` is a group of the mesh (its facets, if it has any), a side ("left", "right", "bottom", "top", "back",
     "front"), a point ("right-middle"), a Plane, a Box, a Near or node numbers.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Force("right", (0.0, -0.043)).words()
+        "force (0, -0.043) N in total on 'right'"
     """
 
     on: Selection
@@ -72,6 +77,11 @@ class Traction(DeadLoad):
 
     `on` is a group of facets, which may lie inside the body; or a side, another group of the mesh, a Plane, a Box or
     node numbers, which select the boundary facets that have all their nodes in the selection.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Traction("right", (50.0, 0.0)).words()
+        "traction (50, 0) Pa on 'right'"
     """
 
     on: Selection
@@ -109,7 +119,13 @@ class Traction(DeadLoad):
 
 @dataclass(frozen=True)
 class Gravity(DeadLoad):
-    """The weight of the whole body under an `acceleration` [m/s^2], one value per direction; needs a density."""
+    """The weight of the whole body under an `acceleration` [m/s^2], one value per direction; needs a density.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Gravity((0.0, -9.81)).words()
+        'gravity (0, -9.81) m/s^2'
+    """
 
     acceleration: Sequence[float]
     on: None = field(default=None, init=False, repr=False)

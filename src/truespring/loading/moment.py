@@ -24,6 +24,11 @@ class Moment(FollowingLoad):
     """A `moment` [N m], anticlockwise, on the nodes `on` of a plane body, which rotates with them.
 
     It does work on their mean rotation. If the nodes stay on a line, the forces are a linear stress along it.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Moment("right", 0.002).words()
+        "moment 0.002 N m on 'right'"
     """
 
     on: Selection

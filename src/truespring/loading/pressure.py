@@ -37,6 +37,11 @@ class Pressure(FollowingLoad):
 
     `on` is a group of facets; or a side, another group of the mesh, a Plane, a Box or node numbers, which select the
     boundary facets that have all their nodes in the selection.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Pressure("top", 200.0).words()
+        "pressure 200 Pa on 'top'"
     """
 
     on: Selection

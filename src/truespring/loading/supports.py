@@ -36,6 +36,13 @@ class Fixed:
         axis: direction of the axis of rotation in 3D.
         over: share of the prescribed motion along the way or over time, see History; None in proportion to the way at
             rest, and in motion for the whole motion at once.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Fixed("left").words(2)
+        "'left' held along x, y"
+        >>> ts.Fixed("right", displacement=(0.01, 0.0)).words(2)
+        "'right' held along x, y, moved by (0.01, 0) m"
     """
 
     on: Selection

@@ -29,7 +29,13 @@ _TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """The nodes at one coordinate: `axis` "x", "y" or "z", `value` [m]."""
+    """The nodes at one coordinate: `axis` "x", "y" or "z", `value` [m].
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Fixed(ts.Plane("x", 0.02), fix=["y"]).words(2)
+        'the nodes at x = 0.02 m held along y'
+    """
 
     axis: str
     value: float
@@ -37,7 +43,13 @@ class Plane:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """The nodes in the box between two opposite corners [m], including its border."""
+    """The nodes in the box between two opposite corners [m], including its border.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Fixed(ts.Box((0.0, 0.0), (0.011, 0.01))).words(2)
+        'the nodes from (0, 0) to (0.011, 0.01) m held along x, y'
+    """
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
@@ -45,7 +57,13 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """The node nearest to a point [m]; of several at equal distance, the one with smaller coordinates."""
+    """The node nearest to a point [m]; of several at equal distance, the one with smaller coordinates.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Force(ts.Near((0.04, 0.005)), (0.0, -0.1)).words()
+        'force (0, -0.1) N in total on the node nearest to (0.04, 0.005) m'
+    """
 
     point: tuple[float, ...]
 
@@ -144,7 +162,14 @@ def _numbers(numbers: Sequence[int], n_there: int, what: str) -> Ints:
 
 
 def nearest_node(mesh: Mesh, point: Sequence[float]) -> int:
-    """Return the node nearest to `point` [m]; of several at equal distance, the one with smaller coordinates."""
+    """Return the node nearest to `point` [m]; of several at equal distance, the one with smaller coordinates.
+
+    Example:
+        >>> import truespring as ts
+        >>> mesh = ts.rectangle((0.16, 0.04), (16, 4))
+        >>> mesh.nodes[ts.nearest_node(mesh, (0.052, 0.0))].tolist()
+        [0.05, 0.0]
+    """
     if len(point) != mesh.dim:
         raise MeshError(f"point {list(point)}: {mesh.dim} coordinates are expected")
     distance = np.linalg.norm(mesh.nodes - np.array(point), axis=1)
@@ -156,6 +181,12 @@ def named_point(mesh: Mesh, name: str) -> int:
     """Return the node nearest to a point named by joined sides, such as "right-middle", "left-top" or "middle".
 
     For the name of a node group, return the node of the group nearest to its centre.
+
+    Example:
+        >>> import truespring as ts
+        >>> mesh = ts.rectangle((0.16, 0.04), (16, 4))
+        >>> mesh.nodes[ts.named_point(mesh, "right-middle")].tolist()
+        [0.16, 0.02]
     """
     if name in mesh.node_groups:
         group = mesh.node_groups[name]

@@ -41,6 +41,13 @@ def rectangle(
 
     Raises MeshError for sizes that are not positive, counts below one, elements flatter than
     1000:1 and a mesh that cannot fit in memory.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.rectangle((0.16, 0.04), (16, 4))
+        Mesh(85 nodes, 64 elements: quadrilateral)
+        >>> ts.rectangle((0.16, 0.04), (16, 4), "triangle")
+        Mesh(85 nodes, 128 elements: triangle)
     """
     _known(element, PLANE_ELEMENTS, "element")
     _known(diagonal, DIAGONALS, "diagonal")
@@ -67,6 +74,13 @@ def box(size: Sequence[float], elements: Sequence[int], element: str = "hexahedr
             "wedge", two per cell, their triangles across z; or "pyramid", six per cell around a node in its middle.
 
     Raises MeshError as `rectangle` does.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.box((0.1, 0.04, 0.04), (5, 2, 2))
+        Mesh(54 nodes, 20 elements: hexahedron)
+        >>> ts.box((0.1, 0.04, 0.04), (5, 2, 2), "tetrahedron")
+        Mesh(54 nodes, 120 elements: tetrahedron)
     """
     _known(element, SOLID_ELEMENTS, "element")
     lengths, counts = _checked(size, elements, "box", "xyz", 2 if element in ("bcc-tetrahedron", "pyramid") else 1)

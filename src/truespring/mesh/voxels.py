@@ -32,6 +32,12 @@ def read_voxels(file: str | Path, label: int | str, edge: float | None = None, u
     Of parts that share no face only the largest is read; a note counts the rest. Node positions follow the origin,
     spacing and direction of the image; in medical images x points to the patient's left, y to the back (LPS, as in
     DICOM and ITK). Raises MeshError, with the file, if the image cannot be read, has no such label, or fills no cube.
+
+    Example:
+        >>> import truespring as ts
+        >>> study = ts.new("organ", "own.toml")  # writes own.nrrd, too
+        >>> ts.read_voxels("own.nrrd", label=1)
+        Mesh(1257 nodes, 857 elements: hexahedron)
     """
     scale = unit_of(unit, "length", f"{file}: unit", MeshError)
     if edge is not None and not (math.isfinite(edge) and edge > 0):

@@ -33,6 +33,18 @@ class BemSprings(Model):
         rule: rule of the springs, a key of RULES; not a coupled one.
         corotated: let the block rotate as a whole, by the rotation that fits its surface best. Otherwise rotations
             cause strain, as in linear elasticity.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> ts.solve(problem, ts.BemSprings(block=ts.Box((0.02, 0.0), (0.04, 0.01))))
+        Solution(BEM + springs (isotropic), converged, 11 states up to load factor 1)
     """
 
     block: Selection

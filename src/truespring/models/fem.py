@@ -31,6 +31,18 @@ class Fem(Model):
             tetrahedra, which are too stiff in bending if linear, and mean dilatation on all kinds above a Poisson's
             ratio of 0.4 in plane strain and 3D; otherwise linear. On a mesh of several kinds, triangles and tetrahedra
             are linear, since quadratic ones would not be conforming.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> ts.solve(problem, ts.Fem("neo-hookean"))
+        Solution(neo-Hookean FEM, converged, 11 states up to load factor 1)
     """
 
     law: str = field()

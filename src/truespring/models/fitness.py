@@ -38,6 +38,19 @@ class Fitness:
         better: the recommended springs if these are not fit and are others.
         sentence: the result in words.
         findings: all findings, material by material.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> found = ts.judge(problem, ts.Springs("gaussian"))
+        >>> found.fit, found.reasons
+        (True, ())
     """
 
     fit: bool
@@ -64,6 +77,19 @@ def judge(problem: Problem, springs: Springs, tolerance: float = 0.05) -> Fitnes
     are not faults, since both errors vanish on finer meshes.
 
     Raises ModelError if the springs do not fit the mesh, or do not resist every strain.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> found = ts.judge(problem, ts.Springs("lloyd"))
+        >>> found.fit, found.better.rule
+        (False, 'gaussian')
     """
     judged = _Judge(problem, tolerance)
     reasons = by_material(problem, lambda twin: (one.sentence for one in judged.faults(twin, springs)))

@@ -39,6 +39,18 @@ class Heml(Model):
 
     Attributes:
         law: saint-venant-kirchhoff on any element; other laws of finite strain on triangles and tetrahedra.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> ts.solve(problem, ts.Heml("saint-venant-kirchhoff"))
+        Solution(HEML (St. Venant-Kirchhoff), converged, 11 states up to load factor 1)
     """
 
     law: str = field()

@@ -36,6 +36,18 @@ class MassTensor(Model):
 
     Attributes:
         law: linear on any element; saint-venant-kirchhoff on triangles and tetrahedra.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> ts.solve(problem, ts.MassTensor("linear"))
+        Solution(mass-tensor (linear), converged, 11 states up to load factor 1)
     """
 
     law: str = field()

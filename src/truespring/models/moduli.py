@@ -56,6 +56,19 @@ class Moduli:
             element size h [-]; 0 if a uniform strain is an equilibrium.
         n_springs, n_negative, n_zero: number of springs, and of springs with negative and with zero stiffness.
         stable: whether the undeformed body is stable, as far as known, if springs have negative stiffness.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> found = ts.moduli(problem, ts.Springs("lloyd"))
+        >>> round(found.poisson(), 3), round(found.anisotropy, 3)
+        (0.412, 1.4)
     """
 
     elasticity: Floats
@@ -238,6 +251,19 @@ def moduli(problem: Problem, springs: SpringsByRule) -> Moduli:
     Dynamical Theory of Crystal Lattices, 1954). On an irregular mesh, a uniform strain is applied to the boundary and
     the inner nodes relax. The stiffness of a spring that several elements share is divided among them.
     Raises ModelError if the springs do not resist every strain.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> found = ts.moduli(problem, ts.Springs("lloyd"))
+        >>> round(found.young() / 10e3, 3), round(found.young(45) / 10e3, 3)
+        (0.882, 1.105)
     """
     material, section = require_body(problem)
     plain = problem.without_fibres

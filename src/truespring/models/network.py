@@ -39,6 +39,18 @@ class SpringNetwork(Model):
         law: force law, a key of PAIR_LAWS: "straight", the default, or "neo-hookean", tension
             k L (s - s^-(d+1)) / (d + 2) with s = l / L and the dimension d of the nodes.
         mass: mass of the nodes, for a motion [kg], shape (n_nodes,); empty, the default, for that of the problem.
+
+    Example:
+        >>> import truespring as ts
+        >>> import numpy as np
+        >>> nodes = np.array([(0.0, 0.0), (1.0, 0.25), (2.0, 0.0)])
+        >>> truss = ts.SpringNetwork(nodes, np.array([(0, 1), (1, 2)]), stiffness=np.array([1.0, 1.0]))
+        >>> problem = ts.Problem(
+        ...     truss.mesh, supports=[ts.Fixed([0, 2]), ts.Fixed([1], fix=["x"])], loads=[ts.Force([1], (0.0, -0.002))]
+        ... )
+        >>> solution = ts.solve(problem, truss)
+        >>> f"{solution.states[-1].displacement[1, 1]:.4f} m"
+        '-0.0190 m'
     """
 
     nodes: Floats

@@ -30,6 +30,22 @@ class PrescribedSprings(Model):
         law: force law, a key of PAIR_LAWS.
 
     Raises ModelError if shapes do not match, or if a node number is not in the mesh of the problem.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> import numpy as np
+        >>> edges = problem.mesh.edges
+        >>> braces = problem.mesh.elements[:, [0, 2]]
+        >>> springs = ts.PrescribedSprings(np.concatenate([edges, braces]), np.full(len(edges) + len(braces), 40.0))
+        >>> ts.solve(problem, springs)
+        Solution(springs (prescribed), converged, 11 states up to load factor 1)
     """
 
     springs: Ints

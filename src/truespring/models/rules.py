@@ -130,6 +130,18 @@ class UserStiffness:
 
     In units of t E in 2D, thickness times Young's modulus, and of E h in 3D, h the edge of a cube of the same volume as
     the element.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> ts.solve(problem, ts.Springs(stiffness=ts.UserStiffness(edge=0.375, diagonal=0.375)))
+        Solution(springs (own stiffness), converged, 11 states up to load factor 1)
     """
 
     edge: float

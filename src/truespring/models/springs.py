@@ -58,6 +58,18 @@ class Springs(Model):
             gaussian.
         law: of the rule gaussian the constitutive law, one of GAUSSIAN_LAWS, by default, None, neo-hookean; of other
             springs the force law, a key of PAIR_LAWS, by default straight; see `laws` of a rule.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> ts.solve(problem, ts.Springs("gaussian"))
+        Solution(springs (gaussian), converged, 11 states up to load factor 1)
     """
 
     rule: str | None = None

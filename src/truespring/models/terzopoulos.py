@@ -37,6 +37,18 @@ class Terzopoulos(Model):
     Attributes:
         boundary: "paper" gives all differences the same weight, which makes a body n cells deep (n + 1) / n times as
             stiff; "trapezoid" halves the weight at the boundary, which is exact for a uniform strain.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> ts.solve(problem, ts.Terzopoulos())
+        Solution(Terzopoulos (paper boundary), converged, 11 states up to load factor 1)
     """
 
     boundary: str = "paper"

@@ -38,6 +38,11 @@ class CalculiX(Program):
         law: "linear", or "saint-venant-kirchhoff" (NLGEOM), the default; None for springs.
         springs: a spring model or network instead of a continuum.
         element: "linear", or "quadratic" for triangles and tetrahedra, where it is the default; not for springs.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.CalculiX(law="saint-venant-kirchhoff").label  # ts.solve(problem, model) runs the program ccx
+        'CalculiX'
     """
 
     law: str | None = None

@@ -116,6 +116,20 @@ def read_result(
 
     The solution has a mesh of the corners of the file's cells, no loads and no supports; `all_positions` of its states
     includes the further nodes of the cells. Raises ReferenceFileError if the file cannot be read or contains no body.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> solution = ts.solve(problem, ts.Fem("neo-hookean"))
+        >>> read = ts.read_result(solution.write("fem.pvd"))
+        >>> read.load_factors.tolist() == solution.load_factors.tolist()
+        True
     """
     placing = Placing(unit, tuple(axes), tuple(shift), load_factor, force_unit, full_time)
     record = read_record(file, field=field, undeformed=undeformed, mesh=mesh, reading=reading)

@@ -51,6 +51,20 @@ def read_stl(
 
     Returns a solution of kind "stl" with a surface, and with one state if `undeformed` is given. Raises
     ReferenceFileError if a file cannot be read, is not such a body, or does not match the problem.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> solution = ts.solve(problem, ts.Fem("neo-hookean"))
+        >>> read = ts.read_stl(problem, solution.write("deformed.stl"))
+        >>> ts.compare(solution, read).surface.outline_max < 1e-6  # [m]
+        True
     """
     file = Path(file)
     mesh = problem.mesh

@@ -1,4 +1,4 @@
-"""Stress, stretch and energy density at the nodes of a body in 3D, as means over its elements, for colours."""
+"""Stress, stretch and energy density at the nodes of a body, as means over its elements, for colours."""
 
 from collections.abc import Mapping
 from itertools import combinations
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truespring.arrays import Floats, Ints
+from truespring.arrays import Floats, Ints, in_space
 from truespring.equilibrium import Solution, State
 from truespring.mesh import Mesh
 from truespring.potential import Visible
@@ -32,19 +32,20 @@ FIELDS: Mapping[str, Field] = {
 
 
 def node_fields(path: Solution, state: State) -> dict[str, Floats]:
-    """Return what is known of FIELDS at the nodes of a solid body, shape (n_nodes,) each.
+    """Return what is known of FIELDS at the nodes of a solid or plane body, shape (n_nodes,) each.
 
     * stress: von Mises, of the mean of the true stress of the elements at a node. The stress of an element that has
       springs only is their virial stress, sum(t l n n) / v with tension t, length l and direction n of each spring and
       the volume v (Thompson, Plimpton, Mattson, General formulation of pressure and stress tensor for arbitrary
-      many-body interaction potentials, J. Chem. Phys. 131 (2009) 154107).
-    * stretch: the largest singular value of the deformation gradient of the elements.
+      many-body interaction potentials, J. Chem. Phys. 131 (2009) 154107); in plane stress with the undeformed
+      thickness, in plane strain not known.
+    * stretch: the largest singular value of the deformation gradient of the elements, in the plane of a plane body.
     * energy: stored energy per undeformed volume [J/m^3]; not known where cells do not hold all of it.
 
     Means over elements are weighted by undeformed volume.
     """
     mesh = path.problem.mesh
-    if mesh.dim != 3 or mesh.element_dim != 3 or path.is_cloud:
+    if mesh.element_dim != mesh.dim or path.is_cloud:
         return {}
     found = {"stretch": _mean(mesh, np.linalg.norm(_gradients(mesh, state.positions), ord=2, axis=(1, 2)))}
     if not isinstance(path.potential, Visible) or len(state.all_positions) != mesh.n_nodes:
@@ -57,7 +58,8 @@ def node_fields(path: Solution, state: State) -> dict[str, Floats]:
     total = sum(float(one.sum()) for one in energies.values())
     if not energies or abs(total - state.energy) > _MISSING * abs(state.energy):
         return found
-    at_rest, now = (mesh.measures_at(positions) for positions in (mesh.nodes, state.positions))
+    thickness = path.problem.body.thickness
+    at_rest, now = (thickness * mesh.measures_at(positions) for positions in (mesh.nodes, state.positions))
     if "elements" in energies and len(energies["elements"]) == len(mesh.elements):
         found["energy"] = _mean(mesh, _in_order(mesh, energies["elements"]) / at_rest)
     elif "lines" in energies:
@@ -65,8 +67,9 @@ def node_fields(path: Solution, state: State) -> dict[str, Floats]:
         if spread is None:
             return found
         found["energy"] = _mean(mesh, spread.sums(energies["lines"]) / at_rest)
-        if "tension" in lines:
-            virial = spread.sums(_virial(spread.ends, lines["tension"], state.positions).reshape(-1, 9))
+        section = path.problem.section
+        if "tension" in lines and (section is None or not section.moduli_words):  # not in plane strain
+            virial = spread.sums(_virial(spread.ends, lines["tension"], in_space(state.positions)).reshape(-1, 9))
             found["stress"] = _von_mises(_mean(mesh, virial.reshape(-1, 3, 3) / now[:, None, None]))
     return found
 
@@ -105,8 +108,8 @@ def _mean(mesh: Mesh, values: Floats) -> Floats:
 
 
 def _gradients(mesh: Mesh, positions: Floats) -> Floats:
-    """Return the deformation gradient that fits the nodes of each element best [-], shape (n_elements, 3, 3)."""
-    found = np.empty((len(mesh.elements), 3, 3))
+    """Return the deformation gradient that fits the nodes of each element best [-], shape (n_elements, dim, dim)."""
+    found = np.empty((len(mesh.elements), mesh.dim, mesh.dim))
     for numbers, part in mesh.blocks:
         rest, now = (
             at[part.elements] - at[part.elements].mean(axis=1, keepdims=True) for at in (mesh.nodes, positions)

@@ -41,6 +41,8 @@ from truespring.report.viewer import viewer
 
 # Largest number of values in all interactive views of a page, about a megabyte.
 _BUDGET = 400_000
+# What draws bodies in 3D and plane ones.
+_DRAWING = {True: "report/scene.min.js", False: "report/plane.js"}
 
 
 def write_page(results: Sequence[Result], file: Path, command: str | None, films: Sequence[Films] = ()) -> None:
@@ -62,12 +64,12 @@ def render_page(results: Sequence[Result], command: str | None, films: Sequence[
         for place, (result, shown) in enumerate(zip(results, films or [{}] * len(results), strict=True), 1)
     ]
     what, several = ("comparison", "comparisons") if results[0].in_detail else ("study", "studies")
-    has_3d_view = any(study["viewer"] and study["in_space"] for study in studies)
-    scene = ("report/scene.min.js",) if has_3d_view else ()
+    drawn = {study["in_space"] for study in studies if study["viewer"]}
+    scripts = [file for in_space, file in _DRAWING.items() if in_space in drawn]
     return render(
         "report/page.html.j2",
         command,
-        (*scene, "report/viewer.js"),
+        (*scripts, "report/viewer.js"),
         title=results[0].title if len(results) == 1 else f"{len(results)} {several}",
         what=what,
         several=several,

@@ -50,17 +50,27 @@ def _lines(path: Solution) -> tuple[Ints, Ints]:
 
 
 def surface_in_scene(mesh: Mesh, pack: Packing) -> dict[str, Any]:
-    """Return the surface that all paths share, and the colours of distances from 0 to the largest."""
+    """Return the surface that all paths share, and tetrahedra of the body."""
     facets = facets_of(mesh)
     edges = outline(mesh.nodes, facets) if len(facets) else mesh.edges
-    colors = np.rint(255 * error_colors(np.linspace(0, 1, 33))).astype(int)
     return {
         "outline": pack.pairs(edges),
         "triangles": pack.pairs(triangles_of(facets)),
         "edges": pack.pairs(edges_of(facets)),
-        "colors": colors.tolist(),
         "tetrahedra": pack.cells(_tetrahedra(mesh)) if len(pack.nodes) == mesh.n_nodes else "",
     }
+
+
+def surface_in_plane(mesh: Mesh, pack: Packing) -> dict[str, Any]:
+    """Return the elements of a plane body as triangles; none of a network."""
+    elements = mesh.elements if mesh.element_dim == 2 else np.zeros((0, 3), dtype=np.int64)
+    return {"triangles": pack.pairs(triangles_of(elements))}
+
+
+def colors_in_view() -> list[list[int]]:
+    """Return the colours of a range of values from the smallest to the largest: red, green and blue, 0 ... 255."""
+    colors: list[list[int]] = np.rint(255 * error_colors(np.linspace(0, 1, 33))).astype(int).tolist()
+    return colors
 
 
 def _tetrahedra(mesh: Mesh) -> Ints:
@@ -109,10 +119,10 @@ def _all_have(several: Sequence[Mapping[str, Floats]], name: str) -> bool:
     return bool(several) and all(name in one for one in several)
 
 
-def path_in_scene(result: Result, name: str, states: Sequence[State], pack: Packing, factor: float) -> dict[str, Any]:
-    """Return a path's lines and its distance from the model: at each level as text, and the largest in packed steps."""
+def path_in_scene(result: Result, name: str, states: Sequence[State], pack: Packing) -> dict[str, Any]:
+    """Return a path's lines, and its distance from the model at each level as text."""
     surface, inside = _lines(result.paths[name])
-    values: dict[str, Any] = {"lines": pack.pairs(surface), "inside": pack.pairs(inside), "most": [], "farthest": None}
+    values: dict[str, Any] = {"lines": pack.pairs(surface), "inside": pack.pairs(inside), "most": []}
     if name == result.model or result.model is None:
         return values
     model = result.paths[result.model]
@@ -126,6 +136,4 @@ def path_in_scene(result: Result, name: str, states: Sequence[State], pack: Pack
     if farthest <= ROUNDING * largest:
         return values
     values["most"] = [None if distance is None else quantity(distance, "m", 2) for distance in distances]
-    if farthest < np.inf:
-        values["farthest"] = {"steps": pack.steps(factor * farthest), "words": quantity(farthest, "m", 2)}
     return values

@@ -1,9 +1,7 @@
 // Draws the model over a reference at each load level, or over time. Plain JavaScript without library or network access.
-// Bodies in 3D are drawn by truespringScene of scene.min.js.
+// Plane bodies are drawn by truespringPlane of plane.js, bodies in 3D by truespringScene of scene.min.js.
 "use strict";
 (() => {
-  const BLUE = "#0072b2", INK = "#16191d", RED = "#d3222a", FAINT = "#a9b0b7", GREEN = "#00795a";
-
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   // x, y[, z], x, y[, z], ... in 0 ... 65535 of the box, or beyond it
   const places = (text, beyond) => new (beyond ? Float32Array : Uint16Array)(bytes(text));
@@ -44,7 +42,8 @@
     const cut = host.querySelector("select[name=cut]"), cutAt = host.querySelector("input[name=at]");
     const model = data.paths[0], others = data.paths.slice(1), dim = data.box.length;
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    const paint = dim === 3 ? window.truespringScene(canvas, data, bar) : plane(canvas, data);
+    data.ask = quantities(data);
+    const paint = dim === 3 ? window.truespringScene(canvas, data, bar) : window.truespringPlane(canvas, data, bar);
     if (!paint) return instead(host);
     let reference = others[data.chosen] || null, playing = 0;
     slider.max = model.levels.length - 1;
@@ -122,9 +121,10 @@
         level, reference, outline: surface(level), mine: at(model, place), theirs: reference && at(reference, place),
         shifts: data.tools.map((tool) => shift(tool, place)),
         ticked: boxes.filter((box) => box.checked).map((box) => box.name),
-        color: color ? color.value : "", node: nodes.shown(),
+        color: color && data.triangles.length ? color.value : "", node: nodes.shown(),
         cut: cut && cut.value ? { axis: Number(cut.value), at: cutAt.value / 1000, other: boxes.some((box) => box.name === "half" && box.checked) } : null,
       };
+      shown.other = shown.theirs !== null && reference !== null && shown.ticked.includes("other") && shown.color !== "distance";
       for (const one of host.querySelectorAll("[data-with]")) { // what another choice needs
         const [name, unlike] = one.dataset.with.split(" "), value = host.querySelector(`select[name=${name}]`).value;
         one.hidden = !value || value === unlike || (one.dataset.with.startsWith("color") && !reference);
@@ -159,6 +159,52 @@
     }
   }
 
+  // What colours stand for: its words, unit and range, and its value at a node of the model or of the reference.
+  function quantities(data) {
+    const dim = data.box.length, model = data.paths[0], unit = Math.max(...data.box) / 65535 / data.factor;
+    const length = (p, q, i) => {
+      let sum = 0;
+      for (let k = dim * i; k < dim * (i + 1); k++) sum += (p[k] - q[k]) ** 2;
+      return unit * Math.sqrt(sum);
+    };
+    const farthest = (p, q) => {
+      let most = 0;
+      for (let i = 0; i < data.n_nodes; i++) most = Math.max(most, length(p, q, i));
+      return most;
+    };
+    const same = (path, level) => path.levels.findIndex((one) => Math.abs(one - level) < 1e-9);
+    const inside = data.paths.filter((path) => !path.beyond).flatMap((path) => path.positions);
+    const largest = Math.max(0, ...inside.map((p) => farthest(p, data.rest)));
+    const apart = new Map(data.paths.slice(1).map((path) => [path, Math.max(0, ...model.levels.map((level, at) => {
+      const other = path.positions.length ? same(path, level) : -1;
+      const most = other < 0 ? 0 : farthest(model.positions[at], path.positions[other]);
+      return most > 2 * unit ? most : 0; // less is rounding
+    }))]));
+
+    function quantity(name, { level, reference, mine, theirs, other }) {
+      if (name === "distance") {
+        if (!theirs) return null;
+        return { title: `distance from ${reference.label}`, unit: data.unit, low: 0, high: apart.get(reference), value: (i) => length(mine, theirs, i) };
+      }
+      const path = other ? reference : model, own = other ? theirs : mine, of = ` of ${path.label}`;
+      if (name === "displacement") return { title: name + of, unit: data.unit, low: 0, high: largest, value: (i) => length(own, data.rest, i) };
+      const field = data.fields.find((one) => one.name === name), steps = path.fields[name] && path.fields[name][same(path, model.levels[level])];
+      return field && steps ? { ...field, title: field.label + of, value: (i) => field.low + ((field.high - field.low) * steps[i]) / field.steps } : null;
+    }
+
+    const share = ({ low, high, value }) => (i) => (high > low ? (value(i) - low) / (high - low) : 0);
+    const written = (value, unit) => `${+value.toPrecision(3)}${unit && " " + unit}`;
+
+    // What is known of a node besides its displacement.
+    function values(node, shown) {
+      return ["distance", ...data.fields.map((field) => field.name)].map((name) => {
+        const known = quantity(name, shown);
+        return known && `${known.label || known.title} ${written(known.value(node), known.unit)}`;
+      }).filter(Boolean);
+    }
+    return { quantity, share, written, values };
+  }
+
   // Reads nodes: under the pointer, where it was clicked, or one after the other by the keys n and p.
   function readNodes(host, canvas, data, paint, draw) {
     const words = host.querySelector("output.node"), unit = Math.max(...data.box) / 65535, dim = data.box.length;
@@ -184,108 +230,26 @@
       kept = way ? all[(Math.max(place, way < 0 ? 0 : -1) + way + all.length) % all.length] : -1;
       draw();
     });
-    const shown = () => (under >= 0 ? under : kept);
+    const asked = () => (under >= 0 ? under : kept);
 
     // A length in the unit of the view, no finer than the data are.
     const round = (value, step) => +(Math.round(value / step) * step).toPrecision(3);
     const vector = (values) => `(${values.join(", ")}) ${data.unit}`.replaceAll("-", "−");
 
-    function write({ mine }) {
-      const node = shown(), axes = [...Array(dim).keys()];
+    function write(shown) {
+      const { mine } = shown;
+      const node = asked(), axes = [...Array(dim).keys()];
       if (node < 0) { words.textContent = words.dataset.hint; return; }
       const rest = axes.map((k) => round(data.lower[k] + unit * data.rest[dim * node + k], unit));
       const moved = axes.map((k) => (unit * (mine[dim * node + k] - data.rest[dim * node + k])) / data.factor);
       const parts = [
         `node <b>${data.numbers.length ? data.numbers[node] : node}</b> at rest at ${vector(rest)}`,
         `displacement <b>${vector(moved.map((value) => round(value, unit / data.factor)))}</b>`,
-        `${round(Math.hypot(...moved), unit / data.factor)} ${data.unit} in all`, ...paint.values(node),
+        `${round(Math.hypot(...moved), unit / data.factor)} ${data.unit} in all`, ...data.ask.values(node, shown),
       ];
       words.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
     }
-    return { shown, write };
-  }
-
-  // The picture of a plane body; `ticked` shows the distances.
-  function plane(canvas, data) {
-    const context = canvas.getContext("2d"), model = data.paths[0];
-    let pixels = null; // where the nodes are on the canvas
-
-    const paint = ({ level, reference, outline, mine, theirs, shifts, ticked, node }) => {
-      const width = canvas.parentElement.clientWidth, pad = 14, [wide, high] = data.box;
-      const scale = Math.min((width - 2 * pad) / wide, Math.max(180, Math.min(460, innerHeight * 0.6)) / high);
-      const height = Math.round(scale * high + 2 * pad + 22), dense = devicePixelRatio || 1;
-      if (canvas.width !== Math.round(width * dense) || canvas.height !== Math.round(height * dense)) {
-        canvas.width = Math.round(width * dense);
-        canvas.height = Math.round(height * dense);
-        canvas.style.height = height + "px";
-      }
-      context.setTransform(dense, 0, 0, dense, 0, 0);
-      context.clearRect(0, 0, width, height);
-      context.lineJoin = context.lineCap = "round";
-      const unit = scale * Math.max(wide, high) / 65535, left = (width - scale * wide) / 2;
-      const x = (p, i) => left + unit * p[2 * i], y = (p, i) => pad + scale * high - unit * p[2 * i + 1];
-      const stroke = (p, lines, color, thick, q = p) => {
-        context.beginPath();
-        for (let i = 0; i < lines.length; i += 2) {
-          context.moveTo(x(p, lines[i]), y(p, lines[i]));
-          context.lineTo(x(q, lines[i + 1]), y(q, lines[i + 1]));
-        }
-        context.strokeStyle = color;
-        context.lineWidth = thick * Math.min(1, Math.max(0.3, Math.sqrt(1500 / lines.length))); // thinner lines for fine meshes
-        context.stroke();
-      };
-      const dot = (p, i, radius, fill, edge) => {
-        context.beginPath();
-        context.arc(x(p, i), y(p, i), radius, 0, 2 * Math.PI);
-        context.fillStyle = fill;
-        context.strokeStyle = edge;
-        context.lineWidth = 1.2;
-        context.fill();
-        context.stroke();
-      };
-
-      bar(context, data.unit, scale, height - 8, pad);
-      context.save();
-      context.beginPath();
-      context.rect(0, 0, width, scale * high + 2 * pad);
-      context.clip(); // clips paths that leave the picture
-      context.setLineDash([4, 3]);
-      stroke(data.rest, data.outline, FAINT, 1);
-      context.setLineDash([]);
-      if (outline) stroke(outline.points, outline.lines, INK, 1.8);
-      else if (theirs) stroke(theirs, reference.lines, INK, 1.8);
-      stroke(mine, model.lines, BLUE, 1);
-      data.tools.forEach((tool, k) => stroke(tool.points.map((value, i) => value + shifts[k][i % 2]), tool.lines, GREEN, 1.6));
-      if (theirs && ticked.length) {
-        const same = new Uint32Array(2 * data.n_nodes);
-        for (let i = 0; i < data.n_nodes; i++) same[2 * i] = same[2 * i + 1] = i;
-        stroke(mine, same, RED, 1.4, theirs);
-      }
-      context.beginPath();
-      for (let i = 0; i <= level; i++) context.lineTo(x(model.positions[i], data.probe), y(model.positions[i], data.probe));
-      context.lineTo(x(mine, data.probe), y(mine, data.probe));
-      context.strokeStyle = RED;
-      context.lineWidth = 1;
-      context.setLineDash([2, 3]);
-      context.stroke();
-      context.setLineDash([]);
-      if (theirs) dot(theirs, data.probe, 4.5, "#fff", INK);
-      dot(mine, data.probe, 4.5, RED, "#fff");
-      if (node >= 0) dot(mine, node, 5.5, "#ffd23f", INK);
-      context.restore();
-      pixels = { at: (i) => [x(mine, i), y(mine, i)], theirs, mine, unit: Math.max(wide, high) / 65535 / data.factor };
-    };
-    const pick = ([u, v]) => {
-      const away = (i) => Math.hypot(pixels.at(i)[0] - u, pixels.at(i)[1] - v);
-      const nearest = candidates.reduce((best, i) => (away(i) < away(best) ? i : best), 0);
-      return away(nearest) < 14 ? nearest : -1;
-    };
-    const candidates = [...Array(data.n_nodes).keys()];
-    const values = (i) => {
-      const { theirs, mine, unit } = pixels;
-      return theirs ? [`${+(unit * Math.hypot(mine[2 * i] - theirs[2 * i], mine[2 * i + 1] - theirs[2 * i + 1])).toPrecision(2)} ${data.unit} from the reference`] : [];
-    };
-    return Object.assign(paint, { pick, values, candidates });
+    return { shown: asked, write };
   }
 
   // A scale bar of a round length; `scale` is pixels per unit.

@@ -13,7 +13,14 @@ from truespring.report.bodies import magnification, path_lines, picture_box
 from truespring.report.packing import Packing
 from truespring.report.quantity import ROUNDING, natural_scale, percent, quantity, times
 from truespring.report.result import Result
-from truespring.report.scene import fields_in_scene, path_in_scene, scene_nodes, surface_in_scene
+from truespring.report.scene import (
+    colors_in_view,
+    fields_in_scene,
+    path_in_scene,
+    scene_nodes,
+    surface_in_plane,
+    surface_in_scene,
+)
 from truespring.report.style import full_name
 from truespring.report.surfaces import outline
 from truespring.report.touching import drawn_tools, near, skins_at
@@ -64,12 +71,11 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
         ],
         "tools": _tools(result, levels, pack),
     }
-    if mesh.dim == 2:
-        return values
     fields, of_paths = fields_in_scene(result, shown, levels, pack)
     for path, own in zip(values["paths"], of_paths, strict=True):
         path["fields"] = own
-    return {**values, **surface_in_scene(mesh, pack), "fields": fields}
+    surface = surface_in_scene if mesh.dim == 3 else surface_in_plane
+    return {**values, **surface(mesh, pack), "fields": fields, "colors": colors_in_view()}
 
 
 def _shown(result: Result) -> list[str]:
@@ -170,7 +176,7 @@ def _path(
         "surface": None,
     }
     if rest.shape[1] == 3:
-        return {**values, **path_in_scene(result, name, states, pack, factor)}
+        return {**values, **path_in_scene(result, name, states, pack)}
     values["lines"] = pack.pairs(path_lines(path))
     if path.surface is not None and factor == 1:
         surface = path.surface

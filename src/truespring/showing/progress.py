@@ -110,18 +110,19 @@ class ProgressBar:
 
     It disappears at full load, or at the end of a `with` block.
 
-    >>> import truespring as ts
-    >>> problem = ts.Problem(
-    ...     mesh=ts.rectangle(size=(0.04, 0.01), elements=(4, 1)),
-    ...     material=ts.Material(young=10e3, poisson=0.3),
-    ...     section=ts.PlaneStress(thickness=0.01),
-    ...     supports=[ts.Fixed(on="left")],
-    ...     loads=[ts.Force(on="right", total=(0.1, 0.0))],
-    ... )
-    >>> with ts.ProgressBar("springs") as bar:
-    ...     solution = ts.solve(problem, ts.Springs(rule="gaussian"), progress=bar)
-    >>> solution.load_factor
-    1.0
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> with ts.ProgressBar("springs") as bar:
+        ...     solution = ts.solve(problem, ts.Springs("gaussian"), progress=bar)
+        >>> solution.load_factor
+        1.0
     """
 
     def __init__(self, label: str = "load factor") -> None:

@@ -58,6 +58,18 @@ class DisplacementControl(Solver):
         tolerance: relative residual below which a state is in equilibrium [-].
         max_iterations: Newton iterations for one state before its step is halved.
         linear: library of factorisations, "scipy", "rslab" or "pardiso", or "direct" for the first that is installed.
+
+    Example:
+        >>> import truespring as ts
+        >>> import numpy as np
+        >>> nodes = np.array([(0.0, 0.0), (1.0, 0.25), (2.0, 0.0)])
+        >>> truss = ts.SpringNetwork(nodes, np.array([(0, 1), (1, 2)]), stiffness=np.array([1.0, 1.0]))
+        >>> problem = ts.Problem(
+        ...     truss.mesh, supports=[ts.Fixed([0, 2]), ts.Fixed([1], fix=["x"])], loads=[ts.Force([1], (0.0, -0.02))]
+        ... )
+        >>> path = ts.solve(problem, truss, ts.DisplacementControl(on=[1], direction="y", to=-0.5, steps=2))
+        >>> [round(float(state.displacement[1, 1]), 3) for state in path.states]  # with the two limit points
+        [0.0, -0.107, -0.25, -0.393]
     """
 
     on: object
@@ -117,6 +129,18 @@ class ArcLength(Solver):
         tolerance: relative residual below which a state is in equilibrium [-].
         max_iterations: Newton iterations for one state before its step is halved.
         linear: library of factorisations, "scipy", "rslab" or "pardiso", or "direct" for the first that is installed.
+
+    Example:
+        >>> import truespring as ts
+        >>> import numpy as np
+        >>> nodes = np.array([(0.0, 0.0), (1.0, 0.25), (2.0, 0.0)])
+        >>> truss = ts.SpringNetwork(nodes, np.array([(0, 1), (1, 2)]), stiffness=np.array([1.0, 1.0]))
+        >>> problem = ts.Problem(
+        ...     truss.mesh, supports=[ts.Fixed([0, 2]), ts.Fixed([1], fix=["x"])], loads=[ts.Force([1], (0.0, -0.02))]
+        ... )
+        >>> path = ts.solve(problem, truss, ts.ArcLength())  # snaps through: some states are unstable
+        >>> path.load_factor, any(state.negative_eigenvalues for state in path.states)
+        (1.0, True)
     """
 
     load_steps: int = 10

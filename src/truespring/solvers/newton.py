@@ -44,6 +44,19 @@ class Newton(Solver):
         linear: "auto" chooses by size and dimension; "multigrid"; "petsc", which several processes may share;
             "direct" for the first installed library of factorisations, or one of them: "scipy", "rslab", "pardiso".
         coarse_start: whether large load steps on large lattices start from the solution on coarser meshes.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.04, 0.01), (4, 1)),
+        ...     ts.Material(young=10e3, poisson=0.3),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     loads=[ts.Force("right", (0.1, 0.0))],
+        ... )
+        >>> solution = ts.solve(problem, ts.Springs("gaussian"), ts.Newton(load_steps=2))
+        >>> solution.load_factors.tolist()
+        [0.0, 0.5, 1.0]
     """
 
     load_steps: int = 10

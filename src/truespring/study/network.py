@@ -35,6 +35,19 @@ def read_network(nodes: str | Path, springs: str | Path) -> SpringNetwork:
 
     Numbers are in SI units unless the header has a unit: "x [mm]", "stiffness [N/mm]". Raises MeshError with file and
     line if a file is damaged or a spring refers to an unknown node.
+
+    Example:
+        >>> import truespring as ts
+        >>> files = {
+        ...     "nodes.csv": ["x [m],y [m]", "0,0", "1,0.25", "2,0"],
+        ...     "springs.csv": ["a,b,stiffness [N/m]", "0,1,1", "1,2,1"],
+        ... }
+        >>> for name, lines in files.items():
+        ...     with open(name, "w") as file:
+        ...         for line in lines:
+        ...             print(line, file=file)
+        >>> ts.read_network("nodes.csv", "springs.csv").springs.tolist()
+        [[0, 1], [1, 2]]
     """
     data = Columns(Path(nodes), _NODE_COLUMNS, ("x", "y"))
     axes = [axis for axis in "xyz" if axis in data.columns]

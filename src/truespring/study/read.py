@@ -29,6 +29,12 @@ class Study(Case):
         text: the file and its TOML, including changed values.
         keys: the checked values in SI units with all defaults; `elements` counts those of the refined mesh.
         halvings: how often the element size of the file was halved.
+
+    Example:
+        >>> import truespring as ts
+        >>> study = ts.read_study(ts.new("strip", "strip.toml"), **{"mesh.elements": [4, 1], "solver.load_steps": 2})
+        >>> study.problem.mesh.n_nodes, list(study.entries), study.references
+        (10, ['springs', 'linear', 'neo-hookean'], ('linear', 'neo-hookean'))
     """
 
     text: "StudyText"
@@ -115,11 +121,12 @@ def read_study(file: str | Path, /, **changes: Any) -> Study:
 
     Raises StudyError with file, line, key, value, what is allowed and the nearest key.
 
-    >>> import truespring as ts, tempfile, pathlib
-    >>> file = ts.new("strip", pathlib.Path(tempfile.mkdtemp()) / "strip.toml")
-    >>> study = ts.read_study(file, **{"material.poisson": 0.4, "material.young": "8 kPa"})
-    >>> study.problem.material
-    Material(young=8000.0, poisson=0.4, ...)
+    Example:
+        >>> import truespring as ts
+        >>> file = ts.new("strip", "strip.toml")
+        >>> study = ts.read_study(file, **{"material.poisson": 0.4, "material.young": "8 kPa"})
+        >>> study.problem.material.young, study.problem.material.poisson
+        (8000.0, 0.4)
     """
     return read_text(file).study(changes)
 

@@ -28,6 +28,14 @@ class Sweep:
         records: of each point, by name, in the order of the plan.
         n_before: number of points solved by earlier runs.
         notes: messages on duplicate points and existing records.
+
+    Example:
+        >>> import truespring as ts
+        >>> study = ts.read_study(ts.new("strip", "strip.toml"), **{"mesh.elements": [4, 1], "solver.load_steps": 2})
+        >>> vary = {"mesh.elements": [[2, 1], [4, 1]], "compare.refine": [False]}
+        >>> found = ts.sweep("strip.toml", vary, workers=1)
+        >>> [row["models.springs.n_nodes"] for row in found.rows]
+        [6, 10]
     """
 
     plan: Plan

@@ -70,6 +70,14 @@ def sweep(
         timeout: time limit of each model [s]; None is no limit.
         progress: whether to show a progress bar in a notebook or terminal; or a callback with the
             number of finished points, of failed ones, and of all.
+
+    Example:
+        >>> import truespring as ts
+        >>> study = ts.read_study(ts.new("strip", "strip.toml"), **{"mesh.elements": [4, 1], "solver.load_steps": 2})
+        >>> vary = {"mesh.elements": [[2, 1], [4, 1]], "compare.refine": [False]}
+        >>> found = ts.sweep("strip.toml", vary, workers=1)
+        >>> found.converged, len(found.rows)
+        (True, 2)
     """
     plan = plan_sweep(study, vary, lhs, seed, points)
     with chosen(progress, lambda: counting("points")) as advance:

@@ -35,6 +35,11 @@ class Grasp:
             None for the whole way.
         origin: place on the path at which the undeformed patch is unloaded [m], one value per direction; None for the
             begin of the path.
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Grasp("forceps", at=(0.04, 0.01), radius=0.004, path=[(0, 0.04, 0.01), (1, 0.05, 0.01)]).words()
+        "'forceps': grasp within 0.004 m of (0.04, 0.01) m, from (0.04, 0.01) m to (0.05, 0.01) m"
     """
 
     name: str

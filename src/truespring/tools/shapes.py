@@ -48,6 +48,12 @@ class Sphere(_Round):
     """A sphere, in the plane a disc, of a `radius` [m]; its path is that of the centre.
 
     Attributes as those of Tool and Touching.
+
+    Example:
+        >>> import truespring as ts
+        >>> probe = ts.Sphere("probe", radius=0.005, path=[(0, 0.02, 0.016), (1, 0.02, 0.013)], friction=0.2)
+        >>> probe.words()
+        "'probe': sphere of radius 0.005 m, friction 0.2, from (0.02, 0.016) m to (0.02, 0.013) m"
     """
 
     name: str
@@ -86,6 +92,12 @@ class Capsule(_Round):
     """A capsule, in the plane a stadium: the places nearer than `radius` [m] to the line from `start` to `end` [m].
 
     The ends are relative to the place on the path. Attributes as those of Tool and Touching.
+
+    Example:
+        >>> import truespring as ts
+        >>> path = [(0, 0.02, 0.02), (1, 0.02, 0.015)]
+        >>> ts.Capsule("rod", radius=0.002, start=(-0.01, 0.0), end=(0.01, 0.0), path=path).words()
+        "'rod': capsule of radius 0.002 m from (-0.01, 0) to (0.01, 0) m, from (0.02, 0.02) m to (0.02, 0.015) m"
     """
 
     name: str
@@ -137,6 +149,11 @@ class HalfSpace(Tool):
     Attributes:
         name, path: as those of Tool; further ones as those of Touching.
         normal: direction of any length that points out of the tool, towards the body [-].
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.HalfSpace("floor", normal=(0.0, 1.0), path=(0.0, 0.0)).words()
+        "'floor': plane with normal (0, 1), at (0, 0) m"
     """
 
     name: str
@@ -175,6 +192,11 @@ class Block(Tool):
     Attributes:
         name, path: as those of Tool; further ones as those of Touching.
         size: lengths along the axes [m].
+
+    Example:
+        >>> import truespring as ts
+        >>> ts.Block("plate", size=(0.06, 0.01), path=[(0, 0.02, 0.016), (1, 0.02, 0.013)]).words()
+        "'plate': box of (0.06, 0.01) m, from (0.02, 0.016) m to (0.02, 0.013) m"
     """
 
     name: str

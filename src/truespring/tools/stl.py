@@ -27,6 +27,20 @@ class StlTool(Tool):
         unit: length unit of the file, such as "mm", which STL files do not state.
         solid: the solid, read from the file. A file that cannot be read, or whose surface is not closed, raises
             MeshError.
+
+    Example:
+        >>> import truespring as ts
+        >>> import numpy as np
+        >>> corners = 0.01 * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
+        >>> lines = []
+        >>> for face in ([0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]):
+        ...     vertices = [f"vertex {x} {y} {z}" for x, y, z in corners[face]]
+        ...     lines += ["facet normal 0 0 0", "outer loop", *vertices, "endloop", "endfacet"]
+        >>> with open("tip.stl", "w") as file:
+        ...     for line in ["solid tip", *lines, "endsolid"]:
+        ...         print(line, file=file)
+        >>> ts.StlTool("tip", "tip.stl", path=[(0, 0.0, 0.02, 0.0), (1, 0.0, 0.01, 0.0)]).words()
+        "'tip': solid of 4 triangles from tip.stl, from (0, 0.02, 0) m to (0, 0.01, 0) m"
     """
 
     name: str

@@ -68,6 +68,14 @@ def map_validity(
             path that was solved, the number of solved paths, and the number needed so far.
 
     Raises StudyError for invalid arguments or combinations of them.
+
+    Example:
+        >>> import truespring as ts
+        >>> study = ts.read_study(ts.new("strip", "strip.toml"), **{"mesh.elements": [4, 1], "solver.load_steps": 2})
+        >>> options = {"law": "linear", "loads": ["stretch"], "rules": ["lloyd"], "y": None}
+        >>> found = ts.map_validity(study, ranges={"load": (0, 0.1)}, **options)
+        >>> found.converged, [one.rule.name for one in found.maps]
+        (True, ['lloyd'])
     """
     read = study if isinstance(study, Study) else read_study(study)
     require_last_level(read, "map", in_proportion=True)

@@ -19,7 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Validity(Maps):
-    """Maps of a study; the attributes are those of `Maps`."""
+    """Maps of a study; the attributes are those of `Maps`.
+
+    Example:
+        >>> import truespring as ts
+        >>> study = ts.read_study(ts.new("strip", "strip.toml"), **{"mesh.elements": [4, 1], "solver.load_steps": 2})
+        >>> options = {"law": "linear", "loads": ["stretch"], "rules": ["lloyd"], "y": None}
+        >>> found = ts.map_validity(study, ranges={"load": (0, 0.1)}, **options)
+        >>> found.converged, list(found.figures())
+        (True, ['validity_stretch_lloyd'])
+    """
 
     @property
     def verdicts(self) -> list[str]:

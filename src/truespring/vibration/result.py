@@ -29,6 +29,19 @@ class Modes:
         converged: whether all of them are accurate.
         n_unknowns, method, seconds: number of free directions, method of solution, and its time [s].
         warnings: sentences.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.16, 0.04), (8, 2)),
+        ...     ts.Material(young=10e3, poisson=0.3, density=1000.0),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     stated=False,
+        ... )
+        >>> found = ts.modes(problem, ts.Fem("linear"), count=2)
+        >>> found.n_rigid, found.shapes.shape
+        (0, (2, 27, 2))
     """
 
     problem: Problem

@@ -33,6 +33,18 @@ def modes(problem: Problem, model: Model | Potential, count: int = 6, linear: st
         linear: linear solver that LOBPCG is preconditioned with, see `Newton`; small systems are solved densely.
 
     Raises ProblemError without a density, and ModelError if the model does not fit the problem.
+
+    Example:
+        >>> import truespring as ts
+        >>> problem = ts.Problem(
+        ...     ts.rectangle((0.16, 0.04), (8, 2)),
+        ...     ts.Material(young=10e3, poisson=0.3, density=1000.0),
+        ...     ts.PlaneStress(thickness=0.01),
+        ...     supports=[ts.Fixed("left")],
+        ...     stated=False,
+        ... )
+        >>> ts.modes(problem, ts.Springs("gaussian"), count=2).frequencies.round(2).tolist()  # [Hz]
+        [0.74, 3.76]
     """
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise ProblemError(f"count = {count!r}: must be a positive number of modes")

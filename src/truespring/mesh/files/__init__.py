@@ -99,6 +99,15 @@ def read_mesh(file: str | Path, unit: str | float = "m", join: bool | None = Non
     line of a text file, if the file cannot be read, is damaged or truncated, or contains no body.
     .inp and .vtk files have no end mark: one truncated between two lines may be read without an error; a .inp
     file then mostly has a note about unreferenced nodes.
+
+    Example:
+        >>> import truespring as ts
+        >>> study = ts.new("mesh", "own.toml")  # writes own.msh, too
+        >>> mesh = ts.read_mesh("own.msh", unit="mm")
+        >>> mesh
+        Mesh(325 nodes, 1141 elements: tetrahedron)
+        >>> sorted(mesh.element_groups)
+        ['tissue', 'tumour']
     """
     file = Path(file)
     scale = unit_of(unit, "length", f"{file}: unit", MeshError)
