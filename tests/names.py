@@ -12,3 +12,9 @@ def words(text: str) -> set[str]:
 def missing(names: Iterable[str], text: str) -> set[str]:
     """The names that are no words of a text."""
     return set(names) - words(text)
+
+
+def named_files(text: str) -> dict[str, str]:
+    """Return the files that a page shows: fenced blocks whose first line is a comment that begins with a name."""
+    blocks = re.findall(r"^```\w+\n((?:\*\*|!|<!--) (\w+\.\w+)\b.*?)^```", text, re.DOTALL | re.MULTILINE)
+    return {name: content for content, name in blocks}

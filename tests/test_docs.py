@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.names import missing
+from tests.names import missing, named_files
 from tests.test_examples import EXAMPLES
 from truespring.mesh import ELEMENT_KINDS
 from truespring.models import ELEMENTS, LAWS, RULES
@@ -47,6 +47,8 @@ def test_the_pages_hold_code() -> None:
 def test_python_on_the_pages_runs(page: str, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # some write files
     shutil.copytree(EXAMPLES, tmp_path / "examples")  # as where one stands in the project
+    for name, text in named_files((ROOT / page).read_text(encoding="utf-8")).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
     exec(compile(code, page, "exec"), {})
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from tests.names import named_files
 from truespring.cli.parser import VERBS, parse
 from truespring.equilibrium import Status
 from truespring.errors import TruespringError
@@ -56,28 +57,30 @@ def studies() -> Iterator[Any]:
                 assert base, f"{page.name}: a block changes no study"
                 whole = changed(base, tables)
                 unrefined = {**whole.get("compare", {}), "refine": False}
-                yield pytest.param({**whole, "compare": unrefined}, id=f"{page.stem}-{number}")
+                yield pytest.param({**whole, "compare": unrefined}, page, id=f"{page.stem}-{number}")
 
 
-def written(study: dict[str, Any], folder: Path) -> Path:
-    """Write a study beside the files that those of `truespring new` and the examples read."""
+def written(study: dict[str, Any], page: Path, folder: Path) -> Path:
+    """Write a study beside the files of its page, of `truespring new` and of the examples."""
     for one in (*(ROOT / "src" / "truespring" / "examples").iterdir(), *EXAMPLES.iterdir()):
         if one.is_file() and one.suffix in (".csv", ".msh", ".nrrd", ".stl"):
             shutil.copy(one, folder)
+    for name, text in named_files(page.read_text(encoding="utf-8")).items():
+        (folder / name).write_text(text, encoding="utf-8")
     file = folder / "study.toml"
     file.write_text(toml_text(study), encoding="utf-8")
     return file
 
 
-@pytest.mark.parametrize("study", list(studies()))
-def test_a_study_of_a_page_is_valid(study: dict[str, Any], tmp_path: Path) -> None:
-    read_study(written(study, tmp_path))
+@pytest.mark.parametrize(("study", "page"), list(studies()))
+def test_a_study_of_a_page_is_valid(study: dict[str, Any], page: Path, tmp_path: Path) -> None:
+    read_study(written(study, page, tmp_path))
 
 
 @pytest.mark.verification
-@pytest.mark.parametrize("study", list(studies()))
-def test_a_study_of_a_page_is_solved(study: dict[str, Any], tmp_path: Path) -> None:
-    found = run(read_study(written(study, tmp_path)))
+@pytest.mark.parametrize(("study", "page"), list(studies()))
+def test_a_study_of_a_page_is_solved(study: dict[str, Any], page: Path, tmp_path: Path) -> None:
+    found = run(read_study(written(study, page, tmp_path)))
     assert found.converged, {name: path.warnings for name, path in found.paths.items()}
 
 

@@ -867,15 +867,15 @@ def test_reactions_of_moved_supports_are_written_and_drawn(tmp_path: FilePath) -
     for row in (rows[10], rows[21]):
         state = found[row["model"]].states[-1]
         right = problem.held[1].nodes
-        assert [float(row["fx"]), float(row["fy"])] == pytest.approx(state.reaction[right].sum(axis=0))
-        assert [float(row["ux"]), float(row["uy"])] == pytest.approx([0.01, -0.02])
+        assert [float(row["fx [N]"]), float(row["fy [N]"])] == pytest.approx(state.reaction[right].sum(axis=0))
+        assert [float(row["ux [m]"]), float(row["uy [m]"])] == pytest.approx([0.01, -0.02])
         about = state.positions[right].mean(axis=0)
         arms, weight = state.positions - about, state.reaction + problem.loading.external_force
         left = np.setdiff1d(np.arange(problem.mesh.n_nodes), right)
         others = (arms[left, 0] * weight[left, 1] - arms[left, 1] * weight[left, 0]).sum()
         own = (arms[right, 0] * problem.loading.external_force[right, 1]).sum()
         if row["model"] == "a":  # linear elements balance on the body at rest
-            assert float(row["mz"]) + own == pytest.approx(-others, rel=1e-6)
+            assert float(row["mz [N m]"]) + own == pytest.approx(-others, rel=1e-6)
     assert "reactions" in draw_figures(told)
 
 

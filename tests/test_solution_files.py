@@ -112,6 +112,7 @@ def test_arrays_of_xarray_carry_units(block: ts.Solution) -> None:
     pytest.importorskip("xarray")
     arrays = block.to_xarray()
     assert dict(arrays.sizes) == {"node": 20, "component": 3, "level": 3}
+    assert (np.stack([arrays.x, arrays.y, arrays.z], axis=1) == block.problem.mesh.nodes).all()
     right = arrays.displacement.where(arrays.x > 0.039, drop=True)
     assert float(right.sel(component="y").isel(level=-1).mean()) < 0
     total = arrays.reaction.sum("node").sel(component="y")

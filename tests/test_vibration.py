@@ -332,7 +332,7 @@ def test_the_verb_writes_and_prints(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert [(row["model"], row["mode"]) for row in rows] == [
         (model, mode) for model in ("springs", "linear") for mode in ("1", "2")
     ]
-    springs, linear = (float(rows[place]["frequency"]) for place in (0, 2))
+    springs, linear = (float(rows[place]["frequency [Hz]"]) for place in (0, 2))
     assert float(rows[0]["difference"]) == pytest.approx(springs / linear - 1) and float(rows[0]["mac"]) > 0.99
     assert f"{springs:.6g}" in table and f"{linear:.6g}" in table and f"{100 * (springs / linear - 1):+.2f} %" in table
     for name in ("springs", "linear"):

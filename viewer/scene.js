@@ -60,7 +60,7 @@ window.truespringScene = (canvas, data, bar) => {
   const grey = surface(theirs, corners, plainMaterial(GREY, { transparent: true, opacity: 0.8 }));
   const hidesModel = surface(mine, corners, hiding()), hidesOutline = surface(theirs, corners, hiding());
   const coloured = surface(mine, corners, colouredMaterial(), shades);
-  const [plainCap, colouredCap] = [plainMaterial(CUT, { side: DoubleSide }), colouredMaterial()].map((material) => {
+  const [plainCap, colouredCap, hidingCap] = [plainMaterial(CUT, { side: DoubleSide }), colouredMaterial(), hiding()].map((material) => {
     const cap = new Mesh(new BufferGeometry(), material);
     cap.frustumCulled = false;
     return cap;
@@ -77,7 +77,7 @@ window.truespringScene = (canvas, data, bar) => {
   back.add(ghost, before, grey, ...black.values());
   [ghost, before, grey, ...black.values()].forEach((one, order) => { one.renderOrder = order; });
   front.add(hidesModel, coloured, plainCap, colouredCap, ...tools.flatMap((tool) => [tool.mesh, tool.edges]), elements, inside, blue);
-  top.add(hidesOutline, rim);
+  top.add(hidesOutline, hidingCap, rim);
 
   // --- a plane that cuts the bodies ------------------------------------------------------------------------------
 
@@ -142,11 +142,13 @@ window.truespringScene = (canvas, data, bar) => {
     if (apart) shade(shades, data.colors, share);
     for (const one of cuttable) one.clippingPlanes = null;
     const cap = apart ? colouredCap : plainCap;
-    plainCap.visible = colouredCap.visible = false;
+    plainCap.visible = colouredCap.visible = hidingCap.visible = false;
     if (shown.cut) {
       cut(shown.cut);
       cap.visible = data.tetrahedra.length > 0;
       if (cap.visible) fill(cap, own.array, share || (() => 0));
+      hidingCap.visible = cap.visible && apart && known;
+      if (hidingCap.visible) fill(hidingCap, opposite.array, () => 0);
     }
     for (const [path, lines] of black) {
       lines.visible = known && !apart && path === reference && lines.lines.length > 0;

@@ -356,7 +356,8 @@ class Solution:
 
         Columns: load_factor, in a motion time [s], displacement of the probe ux, uy[, uz] [m], applied force fx, fy[,
         fz] [N], energy [J], smallest and largest stretch of the springs, area_ratio, iterations, residual, and state:
-        stable, unstable or the kind of a critical point. The units are in `attrs["units"]` of a pandas table.
+        stable, unstable, the kind of a critical point, or empty if not known. The units are in `attrs["units"]` of a
+        pandas table.
 
         Args:
             probe: number of a node, a point such as "right-middle", or a position [m], whose nearest node is taken; by

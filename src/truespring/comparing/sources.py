@@ -281,11 +281,16 @@ _DAMAGED = (ReferenceFileError, ValueError, KeyError, TypeError, AttributeError)
 
 
 def _rows(table: Path, name: str) -> list[tuple[float, list[dict[str, str]]]]:
-    """Return the rows of a model in a table, by load factor."""
+    """Return the rows of a model in a table, by load factor; names of columns without their units."""
     text = read_file(table, ReferenceFileError).decode("utf-8")
-    rows = [row for row in csv.DictReader(io.StringIO(text, newline="")) if row.get("model") == name]
+    named = ({str(head).partition(" [")[0]: cell for head, cell in row.items()} for row in _table(text))
+    rows = [row for row in named if row.get("model") == name]
     levels = dict.fromkeys(float(row["load_factor"]) for row in rows)
     return [(level, [row for row in rows if float(row["load_factor"]) == level]) for level in levels]
+
+
+def _table(text: str) -> "csv.DictReader[str]":
+    return csv.DictReader(io.StringIO(text, newline=""))
 
 
 def _numbers(row: Mapping[str, str], columns: Sequence[str]) -> Floats:

@@ -1,6 +1,7 @@
 """curves.csv: displacement of the probe and force; reactions.csv: forces and torques of moved supports."""
 
 import csv
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from truespring.report.result import Result
 
 
 def write_curves(result: Result, file: Path) -> None:
-    """Write columns model, load_factor, ux, uy[, uz] [m], fx, fy[, fz] [N], one row per model and level.
+    """Write columns model, load_factor, ux, uy[, uz], fx, fy[, fz], one row per model and level, in m and N.
 
     If a path has unstable states, a last column `state` is stable, unstable or the kind of critical point.
     """
@@ -38,18 +39,23 @@ def write_curves(result: Result, file: Path) -> None:
                 )
 
 
+def heads(letter: str, names: Iterable[str], unit: str) -> list[str]:
+    """Return columns of a letter and each of the names, with their unit, such as "ux [m]"."""
+    return [f"{letter}{name} [{unit}]" for name in names]
+
+
 def write_reactions(result: Result, file: Path) -> None:
     """Write columns model, load_factor, support, on, ux, uy[, uz] [m], fx, fy[, fz] [N], [mx, my,] mz [N m], compared.
 
     One row per model, level and moved support; supports are numbered from 1, `on` is their selection. u is the mean
     displacement of the support's nodes, f and m are its force and torque on the body, see SupportForce. `compared`
-    names which of the two are compared with a reference: those that do not vanish.
+    names which of the two are compared with a reference: those that do not vanish. The header line states the units.
     """
     axes = AXES[: result.problem.mesh.dim]
-    letters = (("u", axes), ("f", axes), ("m", torque_axes(len(axes))))
+    torques = torque_axes(len(axes))
     with file.open("w", newline="", encoding="utf-8") as stream:
         table = csv.writer(stream)
-        columns = [f"{letter}{axis}" for letter, several in letters for axis in several]
+        columns = [*heads("u", axes, "m"), *heads("f", axes, "N"), *heads("m", torques, "N m")]
         table.writerow(["model", "load_factor", "support", "on", *columns, "compared"])
         for name, path in result.paths.items():
             for state in path.states:

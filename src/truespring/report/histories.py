@@ -7,6 +7,7 @@ from pathlib import Path
 from truespring.arrays import Floats
 from truespring.equilibrium import Solution, State
 from truespring.mesh.selections import AXES
+from truespring.report.curves import heads
 from truespring.report.result import Result
 
 _ENERGIES = ("kinetic", "elastic", "loads", "contact", "damped", "numerical", "total")
@@ -18,22 +19,21 @@ def write_histories(result: Result, folder: Path) -> None:
     * motion.csv: model, time [s], ux, uy[, uz] [m], vx, vy[, vz] [m/s] at the probe, fx, fy[, fz], the total applied
       force [N].
     * energies.csv: model, time [s], and energies [J], see `Energies`.
-    * tools.csv: model, tool, time [s] or at rest the share of the way, x, y[, z] [m], fx, fy[, fz], the force of the
-      body on the tool [N], depth [m].
+    * tools.csv: model, tool, time [s] or at rest `share` of the way, x, y[, z] [m], fx, fy[, fz], the force of the body
+      on the tool [N], depth [m].
+
+    The header line states the units, such as "ux [m]".
     """
     problem = result.problem
     axes = AXES[: problem.mesh.dim]
+    time = "share" if problem.dynamics is None else "time [s]"
     if problem.dynamics is not None:
-        columns = ["model", "time", *_each("u", axes), *_each("v", axes), *_each("f", axes)]
+        columns = ["model", time, *heads("u", axes, "m"), *heads("v", axes, "m/s"), *heads("f", axes, "N")]
         _write(folder / "motion.csv", columns, _motion(result))
-        _write(folder / "energies.csv", ["model", "time", *_ENERGIES], _energies(result))
+        _write(folder / "energies.csv", ["model", time, *heads("", _ENERGIES, "J")], _energies(result))
     if problem.tools or problem.grasps:
-        columns = ["model", "tool", "time", *axes, *_each("f", axes), "depth"]
+        columns = ["model", "tool", time, *heads("", axes, "m"), *heads("f", axes, "N"), "depth [m]"]
         _write(folder / "tools.csv", columns, _tools(result))
-
-
-def _each(letter: str, axes: Iterable[str]) -> list[str]:
-    return [f"{letter}{axis}" for axis in axes]
 
 
 def _write(file: Path, columns: list[str], rows: Iterable[list[object]]) -> None:

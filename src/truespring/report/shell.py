@@ -98,6 +98,6 @@ def _smaller(png: bytes) -> bytes:
         return png
     file = io.BytesIO()
     with Image.open(io.BytesIO(png)) as image:
-        few = image.convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few = image.convert("RGB").quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     few.save(file, format="png", compress_level=9)
     return file.getvalue()

@@ -1,7 +1,7 @@
 """Quantities that colours stand for: values of nodes, of lines or of elements."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -37,6 +37,16 @@ class Paint:
     colors: str = "viridis"
     span: tuple[float, float] | None = None
 
+    def at_nodes(self, n_nodes: int) -> "Paint":
+        """Return values of lines as means at the nodes that they join; other values unchanged."""
+        if self.on != "lines":
+            return self
+        ends, values = self.lines.ravel(), np.repeat(self.values, 2)
+        count = np.bincount(ends, minlength=n_nodes)
+        with np.errstate(invalid="ignore"):  # NaN where no line ends
+            means = np.bincount(ends, values, n_nodes) / count
+        return replace(self, label=f"{self.label}, mean at nodes", on="nodes", values=means, lines=self.lines[:0])
+
     @property
     def limits(self) -> tuple[float, float]:
         """The values of the first and the last colour: from zero, or as far to both sides of the middle."""
@@ -57,7 +67,11 @@ def paint_of(color: str, pair: Pair, state: State) -> Paint:
     if color not in COLORS:
         allowed = ", ".join(COLORS)
         raise OutputError(f"color = {shown(color)} is unknown{nearest(str(color), COLORS)}; allowed: {allowed}")
-    return COLORS[color](pair, state)
+    paint = COLORS[color](pair, state)
+    if paint is None:
+        others = [name for name in COLORS if (pair.over or name != "distance") and COLORS[name](pair, state)]
+        raise OutputError(f"color = '{color}': {pair.solution.label} has no {color}; it has {', '.join(others)}")
+    return paint
 
 
 def _displacement(pair: Pair, state: State) -> Paint:
@@ -77,14 +91,14 @@ def _distance(pair: Pair, state: State) -> Paint:
     return Paint("distance", "m", "nodes", apart, colors="distance")
 
 
-def _stretch(pair: Pair, state: State) -> Paint:
+def _stretch(pair: Pair, state: State) -> Paint | None:
     """Stretch of the springs; without springs that of the edges of elements."""
     solution = pair.solution
     lines, fields = _line_fields(solution, state)
     if "stretch" in fields:
         return Paint("stretch of springs", "-", "lines", fields["stretch"], lines, 1.0, "coolwarm")
     if solution.is_cloud:
-        raise OutputError(f"color = 'stretch': {solution.label} has points only, no springs or elements")
+        return None
     mesh = solution.problem.mesh
     rest, now = (np.linalg.norm(at[mesh.edges[:, 1]] - at[mesh.edges[:, 0]], axis=1) for at in _both(solution, state))
     return Paint("stretch of edges", "-", "lines", now / rest, mesh.edges, 1.0, "coolwarm")
@@ -94,23 +108,22 @@ def _both(solution: Solution, state: State) -> tuple[Floats, Floats]:
     return solution.problem.mesh.nodes, state.positions
 
 
-def _tension(pair: Pair, state: State) -> Paint:
+def _tension(pair: Pair, state: State) -> Paint | None:
     """Tension of springs; of Gaussian springs its change."""
     solution = pair.solution
     lines, fields = _line_fields(solution, state)
     for name, label in (("tension", "tension of springs"), ("tension_change", "change of tension of springs")):
         if name in fields:
             return Paint(label, "N", "lines", fields[name], lines, 0.0, "coolwarm")
-    raise OutputError(f"color = 'tension': {solution.label} has no springs; use stress, stretch or displacement")
+    return None
 
 
-def _stress(pair: Pair, state: State) -> Paint:
+def _stress(pair: Pair, state: State) -> Paint | None:
     """Von Mises stress of the elements: sqrt(3/2 s : s), s the deviator of the true stress."""
     solution = pair.solution
     fields = _element_fields(solution, state)
     if "stress" not in fields:
-        has = "springs have a tension" if solution.has_springs else "results that were read have no stress"
-        raise OutputError(f"color = 'stress': {solution.label} has no stress ({has}); use tension, stretch or distance")
+        return None
     stress = fields["stress"].reshape(-1, 3, 3)
     deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     return Paint("von Mises stress", "Pa", "elements", np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))))
@@ -154,7 +167,7 @@ def _element_fields(solution: Solution, state: State) -> dict[str, Floats]:
 
 
 #: Quantities that colours may stand for, by the value of `color`.
-COLORS: dict[str, Callable[[Pair, State], Paint]] = {
+COLORS: dict[str, Callable[[Pair, State], Paint | None]] = {
     "distance": _distance,
     "displacement": _displacement,
     "stretch": _stretch,

@@ -11,6 +11,7 @@ from truespring.report.axis import axis_of
 from truespring.report.bodies import magnification, over_title
 from truespring.report.quantity import times
 from truespring.report.style import BLUE, FAINT, INK, MOTION
+from truespring.report.surfaces import facets_of
 from truespring.report.touching import drawn_tools, entries
 from truespring.showing.frames import Entry, draw_legend
 from truespring.showing.paints import Paint, paint_of
@@ -42,7 +43,7 @@ class Picture:
 def pictures_of(pair: Pair, states: Sequence[State], color: str | None, magnify: float | None) -> list[Picture]:
     """Return pictures of some states, all in one frame and with the same colours for the same values."""
     factor = _factor(pair, magnify)
-    paints = [None if color is None else paint_of(color, pair, state) for state in states]
+    paints = [None if color is None else _paint(pair, state, color) for state in states]
     scenes = [_scene(pair, state, factor, paint) for state, paint in zip(states, _alike(paints), strict=True)]
     boxes = [scene.box for scene in scenes]
     frame = np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
@@ -57,6 +58,12 @@ def surface_picture(pair: Pair) -> Picture:
     solution = pair.solution
     scene = Scene(mesh=solution.problem.mesh, rest=None, mine=shape_of(solution, None, 1.0))
     return Picture(scene, [solution.label], [Entry(solution.label, BLUE)])
+
+
+def _paint(pair: Pair, state: State, color: str) -> Paint:
+    """Return the values of a quantity; of springs in a body in space, whose surface is coloured, means at nodes."""
+    mesh, paint = pair.solution.problem.mesh, paint_of(color, pair, state)
+    return paint.at_nodes(mesh.n_nodes) if len(facets_of(mesh)) else paint
 
 
 def _alike(paints: Sequence[Paint | None]) -> list[Paint | None]:

@@ -99,12 +99,8 @@ def _painted(mesh: Mesh, shape: Shape, paint: Paint) -> Layer:
 
 
 def _on_corners(mesh: Mesh, facets: Ints, paint: Paint) -> Floats:
-    """Return the values at the corners of the facets, shape (n_facets, corners); of lines the means at their ends."""
+    """Return the values at the corners of the facets, shape (n_facets, corners)."""
     if paint.on == "elements":
         owners = find_facets(mesh.elements, mesh.element, facets)[:, 0]
         return np.repeat(paint.values[owners][:, None], facets.shape[1], axis=1)
-    if paint.on == "nodes":
-        return np.asarray(paint.values[facets])
-    ends, values = paint.lines.ravel(), np.repeat(paint.values, 2)
-    count = np.bincount(ends, minlength=mesh.n_nodes)
-    return np.asarray((np.bincount(ends, values, mesh.n_nodes) / np.maximum(count, 1))[facets])
+    return np.asarray(paint.values[facets])

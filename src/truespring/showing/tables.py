@@ -53,8 +53,15 @@ def _row(solution: Solution, state: State, probe: int) -> dict[str, tuple[str, A
     row["smallest_stretch"], row["largest_stretch"] = ("-", least), ("-", most)
     row["area_ratio"] = ("-", state.area_ratio)
     row["iterations"], row["residual"] = ("-", state.iterations), ("-", state.residual)
-    row["state"] = ("", state.critical or ("unstable" if state.negative_eigenvalues else "stable"))
+    row["state"] = ("", state.critical or _stability(state))
     return row
+
+
+def _stability(state: State) -> str:
+    """Return whether a state is stable, empty if that is not known."""
+    if state.negative_eigenvalues is None:
+        return ""
+    return "unstable" if state.negative_eigenvalues else "stable"
 
 
 def table_of(solution: Solution, probe: Probe) -> Any:

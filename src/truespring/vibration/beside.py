@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 # Largest number of modes in the figure.
 _DRAWN = 8
 _COLUMNS = ("model", "mode", "frequency", "modal_mass", "residual", "reference_mode", "difference", "mac")
+_UNITS = {"frequency": "Hz", "modal_mass": "kg"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,9 +163,8 @@ class StudyModes:
         with Output(Path(out) / self.stem, "modes.json") as output:
             folder = output.staging
             with (folder / "modes.csv").open("w", newline="", encoding="utf-8") as stream:
-                table = csv.DictWriter(stream, _COLUMNS)
-                table.writeheader()
-                table.writerows(self.rows)
+                csv.writer(stream).writerow(f"{name} [{_UNITS[name]}]" if name in _UNITS else name for name in _COLUMNS)
+                csv.DictWriter(stream, _COLUMNS).writerows(self.rows)
             for name, modes in self.found.items():
                 write_shapes(modes, self.shown(name), folder, f"{name}_modes")
             save_drawings(drawings(mode_figures(self.title, self.columns(), _DRAWN)), folder / "figures")
