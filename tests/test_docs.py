@@ -3,10 +3,12 @@
 import json
 import re
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib import pyplot
 
 from tests.names import missing, named_files
 from tests.test_examples import EXAMPLES
@@ -25,16 +27,31 @@ PAGES = [ROOT / "README.md", *(page for one in SECTIONS for page in sorted((ROOT
 MANY = ("docs/howto/", "docs/coming-from/")
 
 
-def blocks(language: str) -> list[Any]:
-    """Page and text of every fenced block of a language; the long ones, under <!-- long -->, are in verification."""
-    found = []
-    for page in PAGES:
-        name = page.relative_to(ROOT).as_posix()
-        fence = re.compile(rf"^(<!-- long -->\n)?```{language}\n(.*?)^```", re.DOTALL | re.MULTILINE)
-        for long, text in fence.findall(page.read_text(encoding="utf-8")):
-            later = bool(long) or name.startswith(MANY)
-            found.append(pytest.param(name, text, marks=[pytest.mark.verification] if later else []))
-    return found
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page; the long ones, under <!-- long -->, run in verification."""
+
+    page: str
+    text: str
+    long: bool
+
+
+def blocks(language: str) -> list[Block]:
+    fence = re.compile(rf"^(<!-- long -->\n)?```{language}\n(.*?)^```", re.DOTALL | re.MULTILINE)
+    return [
+        Block(page.relative_to(ROOT).as_posix(), text, bool(long))
+        for page in PAGES
+        for long, text in fence.findall(page.read_text(encoding="utf-8"))
+    ]
+
+
+def pages_of_python() -> list[Any]:
+    """Return pages, and whether their long blocks run."""
+    found = {(one.page, one.long) for one in blocks("python")}
+    return [
+        pytest.param(page, long, marks=[pytest.mark.verification] if long or page.startswith(MANY) else [])
+        for page, long in sorted(found)
+    ]
 
 
 def test_the_pages_hold_code() -> None:
@@ -42,19 +59,31 @@ def test_the_pages_hold_code() -> None:
     assert len(blocks("toml")) >= 2
 
 
-@pytest.mark.parametrize(("page", "code"), blocks("python"))
-def test_python_on_the_pages_runs(page: str, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("page", "long"), pages_of_python())
+def test_python_on_the_pages_runs(page: str, long: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blocks of a page follow each other: each may use the names of those before it."""
     monkeypatch.chdir(tmp_path)  # some write files
     shutil.copytree(EXAMPLES, tmp_path / "examples")  # as where one stands in the project
     for name, text in named_files((ROOT / page).read_text(encoding="utf-8")).items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    exec(compile(code, page, "exec"), {})
+    known: dict[str, object] = {}
+    for one in blocks("python"):
+        if one.page == page and one.long <= long:
+            exec(compile(one.text, page, "exec"), known)
+    pyplot.close("all")
 
 
-@pytest.mark.parametrize(("page", "text"), [one for one in blocks("toml") if not one.values[0].startswith(MANY)])
-def test_studies_on_the_pages_run(page: str, text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "block",
+    [
+        pytest.param(one, marks=[pytest.mark.verification] if one.long else [])
+        for one in blocks("toml")
+        if not one.page.startswith(MANY)
+    ],
+)
+def test_studies_on_the_pages_run(block: Block, tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(block.text, encoding="utf-8")
     for table in (ROOT / "examples").glob("*.csv"):
         shutil.copy(table, tmp_path)
     assert run(read_study(file)).converged
