@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from matplotlib import pyplot
 
 from tests.names import missing, named_files
 from tests.test_examples import EXAMPLES
@@ -41,15 +42,22 @@ def test_the_pages_hold_code() -> None:
 
 
 @pytest.mark.parametrize(
-    ("page", "code"),
-    [pytest.param(*one, marks=[pytest.mark.verification] if in_section(one[0]) else []) for one in blocks("python")],
+    "page",
+    [
+        pytest.param(page, marks=[pytest.mark.verification] if in_section(page) else [])
+        for page in dict.fromkeys(page for page, _ in blocks("python"))
+    ],
 )
-def test_python_on_the_pages_runs(page: str, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_on_the_pages_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blocks of a page follow each other: each may use the names of those before it."""
     monkeypatch.chdir(tmp_path)  # some write files
     shutil.copytree(EXAMPLES, tmp_path / "examples")  # as where one stands in the project
     for name, text in named_files((ROOT / page).read_text(encoding="utf-8")).items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    exec(compile(code, page, "exec"), {})
+    known: dict[str, object] = {}
+    for _, code in (one for one in blocks("python") if one[0] == page):
+        exec(compile(code, page, "exec"), known)
+    pyplot.close("all")
 
 
 @pytest.mark.parametrize(("page", "text"), [one for one in blocks("toml") if not in_section(one[0])])
