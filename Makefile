@@ -6,7 +6,9 @@ BIN := .venv/bin
 PETSC_DIR ?= /usr/lib/petscdir/petsc3.18/x86_64-linux-gnu-real
 PETSC4PY ?= 3.18.5
 
-.PHONY: demo petsc test verification validity table1 hourglass bench viewer clean
+SPHINX := -W --keep-going -n -q -j 2 -b html
+
+.PHONY: demo docs docs-quick petsc test verification validity table1 hourglass bench viewer clean
 
 demo: .venv/demo
 	@$(BIN)/truespring verify examples/stretching.toml examples/bending.toml --out out/demo
@@ -18,12 +20,22 @@ test: .venv/test
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q -n 2 -m "not verification"
 
-# Runs the long tests, those of PETSc if it is installed, and rebuilds docs/verification.md and the picture of the README.
+# Runs the long tests, those of PETSc if it is installed, and rebuilds docs/verification.md and the pictures of the pages.
 verification: .venv/test $(if $(wildcard $(PETSC_DIR)/include/petscversion.h),.venv/petsc)
 	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m verification
 	$(BIN)/python docs/build_verification.py
 	$(BIN)/python docs/build_picture.py
 	$(BIN)/python docs/build_theory.py
+
+# Builds the site into out/docs: runs all notebooks and the gallery. Warnings are errors, and every link must lead somewhere.
+docs: .venv/docs
+	$(BIN)/sphinx-build $(SPHINX) -d out/doctrees docs out/docs
+	$(BIN)/python docs/check_links.py out/docs
+
+# The same without notebooks and gallery: pages, links, the Python reference.
+docs-quick: .venv/docs-quick
+	$(BIN)/sphinx-build $(SPHINX) -t quick -d out/doctrees-quick docs out/docs-quick
+	$(BIN)/python docs/check_links.py out/docs-quick
 
 # Measures Table 1 of the paper and rebuilds docs/table1.md. It measures times: run nothing else meanwhile.
 table1: .venv/test
@@ -62,6 +74,14 @@ petsc: .venv/petsc
 
 .venv/test: .venv/created pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $@ .venv/demo
+
+.venv/docs: .venv/created pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	touch $@ .venv/docs-quick .venv/demo
+
+.venv/docs-quick: .venv/created pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	touch $@ .venv/demo
 
 .venv/petsc: .venv/test

@@ -1,5 +1,6 @@
 """Springs that are no tendons, run by MuJoCo with the driver that is written beside them."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -13,7 +14,7 @@ import pytest
 import truespring as ts
 from tests.exports import exported, imported, write
 from tests.test_examples import EXAMPLES
-from truespring.exports import Exported, solve_springs, target_files
+from truespring.exports import Exported, solve_springs, target_files, with_expectation
 from truespring.mesh import in_simplices
 from truespring.study import read_study
 
@@ -218,12 +219,19 @@ def test_flex_is_biquadratic_springs_on_triangles_or_tetrahedra(name: str, drive
     expected = ts.solve(twin, ts.Springs("biquadratic"), ts.Newton(load_steps=2)).states[-1].positions
     away = data.site_xpos[:, : problem.mesh.dim] - expected
     assert np.abs(away).max() < 1e-6 * np.abs(expected - problem.mesh.nodes).max()
-    assert 0.3 < module.distance(model, data, module.Body.load(folder / "springs.npz")) < 0.95
+    distance = module.distance(model, data, module.Body.load(folder / "springs.npz"))
+    assert 0.3 < distance < 0.95
+    stated = json.loads(str(with_expectation(one, "mujoco", {})["exported.json"]))["flex"]
+    assert stated["largest_difference"] == pytest.approx(distance, rel=1e-5) and stated["file"] == "flex.xml"
+    place = data.site(f"n{one.probe}").xpos[: problem.mesh.dim] - problem.mesh.nodes[one.probe]
+    assert place == pytest.approx(stated["probe_displacement"], rel=1e-4, abs=1e-6 * np.abs(place).max())
 
 
 def test_bodies_that_move_have_no_flex() -> None:
     """MuJoCo takes initial positions as undeformed."""
-    assert "flex.xml" not in target_files(body("gaussian, moved"), ["mujoco"])["mujoco"]
+    one = body("gaussian, moved")
+    assert "flex.xml" not in target_files(one, ["mujoco"])["mujoco"]
+    assert "flex" not in json.loads(str(with_expectation(one, "mujoco", {})["exported.json"]))
 
 
 @pytest.mark.parametrize(("arguments", "bound"), [([], 1e-4), (["--file", "flex.xml"], 1.0)])

@@ -2,9 +2,6 @@
 
 import base64
 import io
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -184,18 +181,41 @@ def test_a_comparison_with_markers_shows_the_springs_themselves(
     assert drawn == [(springs, markers)]
 
 
+# --- a real notebook --------------------------------------------------------------------------------
+
+CELLS = (
+    """import truespring as ts
+problem = ts.Problem(
+    ts.rectangle((0.04, 0.01), (4, 1)),
+    ts.Material(young=10e3, poisson=0.3),
+    ts.PlaneStress(thickness=0.01),
+    supports=[ts.Fixed("left")],
+    loads=[ts.Force("right", (0.1, 0.0))],
+)
+models = {"springs": ts.Springs("gaussian"), "fem": ts.Fem("neo-hookean")}
+result = ts.verify(problem, models=models, refine=False)
+result""",
+    "result.solutions['springs'].plot();",
+)
+
+
 @pytest.mark.verification
-def test_the_first_card_of_a_notebook_leaves_the_interactive_mode_on(tmp_path: Path) -> None:
-    """The backend of notebooks turns it on when pyplot loads it, which may be while a card is drawn."""
-    (tmp_path / "late.py").write_text(
-        "import matplotlib\nfrom matplotlib.backends.backend_agg import *\nmatplotlib.interactive(True)\n", "utf-8"
-    )
-    code = (
-        "import matplotlib\nfrom matplotlib import pyplot\nfrom truespring.showing.cards import png_of_axes\n"
-        "assert not matplotlib.is_interactive()\n"
-        "png_of_axes(lambda: pyplot.subplots()[1])\nassert matplotlib.is_interactive()\n"
-    )
-    path = os.pathsep.join([str(tmp_path), *sys.path])
-    subprocess.run(
-        [sys.executable, "-c", code], env={**os.environ, "MPLBACKEND": "module://late", "PYTHONPATH": path}, check=True
-    )
+def test_a_notebook_shows_progress_values_and_figures() -> None:
+    """A figure is shown after a card, too, whose picture is drawn by the same library."""
+    nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    shown: list[str] = []
+
+    class Client(nbclient.NotebookClient):  # type: ignore[misc, name-defined]
+        def process_message(self, message: Any, cell: Any, number: int) -> Any:
+            if "display_data" in message["msg_type"]:
+                shown.append(message["content"]["data"].get("text/html", ""))
+            return super().process_message(message, cell, number)
+
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(text) for text in CELLS])
+    Client(notebook, timeout=120, kernel_name="python3").execute()
+    progress, value = notebook.cells[0].outputs
+    assert 'value="1" max="1"' in shown[-3] and progress.data["text/html"] == ""
+    read = Read(value.data["text/html"])
+    assert "Result: problem" in read.texts and len(read.pictures) == 1
+    (figure,) = notebook.cells[1].outputs
+    assert figure.data["image/png"]

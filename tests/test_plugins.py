@@ -1,6 +1,8 @@
 """Entry points: the example package in examples/plugin, made known to Python by a dist-info folder as pip writes it."""
 
 import json
+import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -190,3 +192,27 @@ def test_pip_installs_the_example_package(tmp_path: Path) -> None:
     )
     shown = subprocess.run([sys.executable, "-c", asked, str(target)], capture_output=True, text=True, check=True)
     assert "one stiffness" in shown.stdout
+
+
+@pytest.mark.verification
+def test_the_entries_of_an_installed_package_keep_the_contracts(tmp_path: Path) -> None:
+    """Installed by pip, without a network; the tests of rules, laws, targets and formats run over its entries."""
+    pytest.importorskip("hatchling")
+    root, site = PLUGIN.parents[1], tmp_path / "site"
+    pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--target", str(site)]
+    subprocess.run([*pip, str(PLUGIN)], check=True)
+    entries = {name: f"tests/test_{name}.py" for name in ("rules", "laws", "export")}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *entries.values()]
+    chosen = "(uniform or ciarlet or csv)"
+    path = os.pathsep.join([str(site), str(root / "src"), str(root)])
+    done = subprocess.run(
+        [*command, "-k", chosen, "-m", "not verification"],
+        cwd=root,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-3000:]
+    (passed,) = re.findall(r"(\d+) passed", done.stdout)
+    assert int(passed) >= 15

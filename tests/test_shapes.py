@@ -455,3 +455,28 @@ def test_groups_are_numbers() -> None:
     for wrong in ([0.7], [True, False]):
         with pytest.raises(MeshError, match="must be a list of element numbers"):
             ts.Mesh(plain.nodes, plain.elements, element_groups={"a": np.array(wrong)})
+
+
+def test_a_mapped_mesh_keeps_elements_groups_and_the_names_of_its_sides() -> None:
+    """A quarter of a ring: its area is that of the polygons, (b^2 - a^2) / 2 n sin(angle / n); "left" is inside."""
+    (inner, outer), n = (1.0, 2.0), 12
+    flat = replace(ts.rectangle((outer - inner, math.pi / 2), (3, n)), node_groups={"top": np.array([0])})
+    ring = ts.mapped(flat, lambda x, y: ((inner + x) * np.cos(y), (inner + x) * np.sin(y)))
+    area = (outer**2 - inner**2) / 2 * n * math.sin(math.pi / 2 / n)
+    assert ring.measures.sum() == pytest.approx(area, rel=1e-12)
+    for side, radius in (("left", inner), ("right", outer)):
+        nodes = ring.nodes[ring.node_groups[side]]
+        assert len(nodes) == n + 1
+        assert np.linalg.norm(nodes, axis=1) == pytest.approx(radius, rel=1e-12)
+    assert ring.node_groups["top"].tolist() == [0]  # a group of the mesh counts before a side
+    assert "front" not in ring.node_groups
+
+
+def test_functions_that_do_not_map_a_mesh_are_errors() -> None:
+    flat = ts.rectangle((1.0, 1.0), (2, 2))
+    with pytest.raises(MeshError, match="inverted"):
+        ts.mapped(flat, lambda x, y: (y, x))
+    with pytest.raises(MeshError, match=r"shapes \[\(9,\)\]: it must return 2 coordinates, each of shape \(9,\)"):
+        ts.mapped(flat, lambda x, y: (x,))
+    with pytest.raises(MeshError, match="vectors of elements"):
+        ts.mapped(replace(flat, element_vectors={"fibres": np.ones((4, 2))}), lambda x, y: (x, y))

@@ -33,6 +33,7 @@ from .mesh import Mesh as Mesh
 from .mesh import Near as Near
 from .mesh import Plane as Plane
 from .mesh import box as box
+from .mesh import mapped as mapped
 from .mesh import named_point as named_point
 from .mesh import nearest_node as nearest_node
 from .mesh import read_mesh as read_mesh

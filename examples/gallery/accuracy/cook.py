@@ -8,7 +8,6 @@ deflection.
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import truespring as ts
 
@@ -18,11 +17,10 @@ light = 1e-5  # share of the unit load, for small strains
 
 def panel(n: int, element: str) -> ts.Problem:
     """48 wide, 44 high on the left and 16 on the right, n by n elements."""
-    flat = ts.rectangle((1.0, 1.0), (n, n), element)
-    x, y = flat.nodes.T
-    nodes = np.stack([48 * x, 44 * x + y * (44 - 28 * x)], axis=1)
+    square = ts.rectangle((1.0, 1.0), (n, n), element)
+    tapered = ts.mapped(square, lambda x, y: (48 * x, 44 * x + y * (44 - 28 * x)))
     return ts.Problem(
-        ts.Mesh(nodes, flat.elements, element),
+        tapered,
         ts.Material(young=1.0, poisson=1 / 3),
         ts.PlaneStress(1.0),
         supports=ts.Fixed("left"),

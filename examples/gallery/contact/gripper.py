@@ -53,9 +53,7 @@ motion = ts.solve(problem, ts.Springs(rule="gaussian"), ts.Newton(tolerance=1e-8
 # the table nothing.
 weight = problem.mass.sum() * gravity
 time = np.array([state.moving.time for state in motion.states])
-force = np.array(
-    [[touch.force for touch in state.touches] for state in motion.states]
-)  # state, tool, component
+force = np.array([[tool.force for tool in state.touches] for state in motion.states])
 carried = -force[:, :2, 1].sum(axis=1)
 print(f"weight {1e3 * weight:.1f} mN, carried by the jaws {1e3 * carried[-1]:.1f} mN")
 assert abs(carried[-1] / weight - 1) < 0.01 and abs(force[-1, 2, 1]) < 1e-3 * weight

@@ -17,12 +17,15 @@ young, poisson, radius, length, depth = 10e3, 0.3, 0.03, 0.12, 0.002
 # %%
 # By symmetry a quarter of the block is enough. Elements are small near the contact, and
 # grow away from it.
-def graded(n: int, ratio: float) -> ts.Mesh:
-    cube = ts.box((1.0, 1.0, 1.0), (n, n, n))
-    share = 1 - cube.nodes  # from the contact, at the corner of the largest x, y and z
-    away = length * (ratio ** (n * share) - 1) / (ratio**n - 1)
-    return ts.Mesh(length - away, cube.elements, "hexahedron")
+def graded(share):
+    """Coordinate of the node at a share of the elements of a side."""
+    return length * (1 - (1.35 ** (9 * (1 - share)) - 1) / (1.35**9 - 1))
 
+
+block = ts.mapped(
+    ts.box((1.0, 1.0, 1.0), (9, 9, 9)),
+    lambda x, y, z: (graded(x), graded(y), graded(z)),
+)
 
 # %%
 # The sphere moves along a path: rows of the share of the way, and the place of its
@@ -38,7 +41,7 @@ ball = ts.Sphere(
     on="top",
 )
 problem = ts.Problem(
-    graded(9, 1.35),
+    block,
     ts.Material(young, poisson),
     supports=[
         ts.Fixed("bottom"),

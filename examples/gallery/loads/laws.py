@@ -45,13 +45,10 @@ def stress(solution):
 
 # %%
 # Neo-Hookean, W = mu/2 (I1 - 3) - mu ln J + lambda/2 (ln J)²: both stresses across
-# vanish (Bonet and Wood, *Nonlinear Continuum Mechanics for Finite Element Analysis*,
-# section 6.4).
+# vanish (Bonet and Wood, *Nonlinear Continuum Mechanics for Finite Element Analysis*).
 def neo_hookean(stretch):
-    mu, lam = (
-        young / 2 / (1 + poisson),
-        young * poisson / (1 + poisson) / (1 - 2 * poisson),
-    )
+    mu = young / 2 / (1 + poisson)
+    lam = 2 * mu * poisson / (1 - 2 * poisson)
     across = brentq(lambda y: mu * (y**2 - 1) + lam * np.log(stretch * y**2), 0.3, 1.5)
     return mu * (stretch - 1 / stretch) + lam * np.log(stretch * across**2) / stretch
 

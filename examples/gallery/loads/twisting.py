@@ -13,18 +13,19 @@ import truespring as ts
 
 mu, poisson, radius, length, angle = 1e5, 0.49, 0.01, 0.04, np.radians(120)
 
-# %%
-# A square of n by n elements is mapped to a disc: rings of squares become circles.
-# Hexahedra stand on it.
-box = ts.box((2.0, length, 2.0), (8, 8, 8))
-x, y, z = (box.nodes - (1, 0, 1)).T
-ring = np.maximum(np.abs(x), np.abs(z))
-roundness = ring / np.maximum(np.hypot(x, z), 1e-12)  # brings a square ring to a circle
-scale = radius * (
-    ring * roundness + (1 - ring) * 0.8
-)  # squares near the axis, circles at the surface
-bar = ts.Mesh(np.stack([scale * x, y, scale * z], axis=1), box.elements, "hexahedron")
 
+# %%
+# A bar of squares becomes round: its rings of elements become circles, the more the
+# nearer they are to the surface.
+def rounded(x, y, z):
+    x, z = x - 1, z - 1
+    ring = np.maximum(np.abs(x), np.abs(z))
+    circle = ring / np.maximum(np.hypot(x, z), 1e-12)
+    scale = radius * (ring * circle + (1 - ring) * 0.8)
+    return scale * x, y, scale * z
+
+
+bar = ts.mapped(ts.box((2.0, length, 2.0), (8, 8, 8)), rounded)
 problem = ts.Problem(
     bar,
     ts.Material(2 * mu * (1 + poisson), poisson),

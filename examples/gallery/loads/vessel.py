@@ -14,24 +14,19 @@ import truespring as ts
 young, poisson, inner, outer, pressure = 1e6, 0.3, 0.010, 0.020, 1e3
 
 # %%
-# A quarter of the pipe is a rectangle that is bent: its first coordinate becomes the
-# radius, its second the angle. The two straight sides are planes of symmetry: they
-# slide in themselves. The pressure stays normal to the inner side.
-flat = ts.rectangle((1.0, 1.0), (12, 24))
-radius, angle = inner + (outer - inner) * flat.nodes[:, 0], flat.nodes[:, 1] * np.pi / 2
-mesh = ts.Mesh(
-    np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1), flat.elements
-)
+# A quarter of the pipe is a rectangle that is bent: its first coordinate is the radius,
+# its second the angle. Its sides keep their names: the left one is inside, the bottom
+# and the top one are planes of symmetry, which slide in themselves.
+flat = ts.rectangle((outer - inner, np.pi / 2), (12, 24))
+radius, angle = inner + flat.nodes[:, 0], flat.nodes[:, 1]
+mesh = ts.mapped(flat, lambda r, a: ((inner + r) * np.cos(a), (inner + r) * np.sin(a)))
 
 problem = ts.Problem(
     mesh,
     ts.Material(young, poisson),
     ts.PlaneStrain(thickness=1.0),
-    supports=[
-        ts.Fixed(np.flatnonzero(angle == 0), fix=["y"]),
-        ts.Fixed(np.flatnonzero(angle == angle.max()), fix=["x"]),
-    ],
-    loads=ts.Pressure(np.flatnonzero(radius == inner), pressure),
+    supports=[ts.Fixed("bottom", fix=["y"]), ts.Fixed("top", fix=["x"])],
+    loads=ts.Pressure("left", pressure),
 )
 springs = ts.solve(problem, ts.Springs(rule="gaussian"), ts.Newton(load_steps=1))
 fem = ts.solve(problem, ts.Fem(law="neo-hookean"), ts.Newton(load_steps=1))

@@ -15,15 +15,19 @@ import truespring as ts
 
 radius, drop, gravity = 0.03, 0.10, 9.81
 
+
 # %%
-# A square of elements is mapped to a disc: rings of squares become circles.
-square = ts.rectangle((2.0, 2.0), (10, 10))
-x, y = (square.nodes - 1).T
-ring = np.maximum(np.abs(x), np.abs(y))
-scale = radius * (ring * ring / np.maximum(np.hypot(x, y), 1e-12) + (1 - ring) * 0.8)
-disc = ts.Mesh(
-    np.stack([scale * x, scale * y + drop + radius], axis=1), square.elements
-)
+# A square of elements becomes a disc: its rings become circles, the more the nearer
+# they are to the edge.
+def rounded(x, y):
+    x, y = x - 1, y - 1
+    ring = np.maximum(np.abs(x), np.abs(y))
+    circle = ring / np.maximum(np.hypot(x, y), 1e-12)
+    scale = radius * (ring * circle + (1 - ring) * 0.8)
+    return scale * x, scale * y + drop + radius
+
+
+disc = ts.mapped(ts.rectangle((2.0, 2.0), (10, 10)), rounded)
 
 # %%
 # The scheme "leapfrog" keeps the energy. The floor is as soft as a layer of rubber, so

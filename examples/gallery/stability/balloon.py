@@ -50,7 +50,7 @@ springs = ts.solve(problem, ts.Springs(rule="gaussian"), arc)
 # %%
 # An incompressible neo-Hookean sphere has a closed form: p = mu (2/b + 1/(2 b⁴) - 2/a -
 # 1/(2 a⁴)) with the stretches a and b around the sphere at the inner and outer surface
-# (Ogden, *Non-linear Elastic Deformations*, section 5.3.3).
+# (Ogden, *Non-linear Elastic Deformations*).
 def closed_form(a):
     b = (1 + (a**3 - 1) * (inner / outer) ** 3) ** (1 / 3)
     return mu * (2 / b + 0.5 / b**4 - 2 / a - 0.5 / a**4)

@@ -47,12 +47,8 @@ assert error < 1e-8
 # An arch of rubber: a strip that is bent to a shallow arc, with both ends clamped,
 # pushed down in the middle.
 flat = ts.rectangle((2 * span, 0.04), (60, 2))
-x = flat.nodes[:, 0] - span
-arch = ts.Mesh(
-    np.stack([x, flat.nodes[:, 1] + rise * np.cos(np.pi * x / 2 / span)], axis=1),
-    flat.elements,
-)
-top = np.flatnonzero(np.isclose(x, 0))
+arch = ts.mapped(flat, lambda x, y: (x - span, y + rise * np.sin(np.pi * x / 2 / span)))
+top = np.flatnonzero(np.isclose(arch.nodes[:, 0], 0))
 rubber = ts.Problem(
     arch,
     ts.Material(1e6, 0.4),

@@ -4,6 +4,7 @@ Source: https://mujoco.readthedocs.io/en/stable/XMLreference.html
 """
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from truespring.exports.arrays import npz
 from truespring.exports.exported import Exported
@@ -13,7 +14,7 @@ from truespring.exports.mjcf import Scene, flex_lines, scene_lines
 from truespring.exports.motion import motion_of
 from truespring.exports.scripts import script
 from truespring.exports.surfaces import is_surface, surface_of
-from truespring.exports.tetrahedra import flex_scene
+from truespring.exports.tetrahedra import flex_scene, flex_values
 from truespring.exports.whole import all_nodes
 from truespring.models.spring_data import PlainSprings
 
@@ -28,7 +29,7 @@ def mujoco(exported: Exported) -> Mapping[str, str | bytes]:
     body as MuJoCo's own finite elements where it has these.
     """
     whole, contact = all_nodes(exported), bool(exported.options.get("contact", False))
-    driven = bool({feature for feature, _ in features(exported.problem, exported.springs)} - _IN_TENDONS)
+    driven = _is_driven(exported)
     surface = surface_of(whole)
     scene = Scene(exported, whole, motion_of(exported), contact, (driven or contact) and is_surface(surface))
     flex = list(flex_lines(scene, "surface", surface)) if scene.flex else []
@@ -41,6 +42,16 @@ def mujoco(exported: Exported) -> Mapping[str, str | bytes]:
         **npz(exported),
         **flex_scene(scene),
     }
+
+
+def mujoco_values(exported: Exported) -> Mapping[str, Any]:
+    """Return what exported.json states of flex.xml."""
+    return flex_values(exported) if _is_driven(exported) else {}
+
+
+def _is_driven(exported: Exported) -> bool:
+    """Return whether tendons do not express the springs."""
+    return bool({feature for feature, _ in features(exported.problem, exported.springs)} - _IN_TENDONS)
 
 
 def _tendons(network: PlainSprings) -> Iterator[str]:

@@ -10,7 +10,7 @@ from truespring.exports.features import ALL, Feature
 from truespring.exports.febio import febio
 from truespring.exports.gltf import gltf
 from truespring.exports.keyword_files import DECKS, NAMES
-from truespring.exports.mujoco import mujoco
+from truespring.exports.mujoco import mujoco, mujoco_values
 from truespring.exports.obj import obj
 from truespring.exports.sofa import sofa
 from truespring.exports.target import Option, Target
@@ -61,6 +61,7 @@ TARGETS: Table[Target] = Table(
             "straight are spatial tendons; others, and elements, are forces that drive.py adds in each step. flex.xml "
             "is an approximation by MuJoCo's own finite elements.",
             left_out="The surface has no contact without the option contact.",
+            details=mujoco_values,
             options=MappingProxyType({"contact": Option(False, "contact of the surface with other bodies")}),
         ),
         "sofa": Target(

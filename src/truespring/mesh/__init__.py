@@ -17,6 +17,7 @@ from truespring.mesh.kinds import MIXED as MIXED
 from truespring.mesh.kinds import ElementKind as ElementKind
 from truespring.mesh.kinds import counted as counted
 from truespring.mesh.kinds import plural as plural
+from truespring.mesh.mapping import mapped as mapped
 from truespring.mesh.measures import corner_measures as corner_measures
 from truespring.mesh.measures import element_corner_measures as element_corner_measures
 from truespring.mesh.mesh import Mesh as Mesh

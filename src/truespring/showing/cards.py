@@ -7,7 +7,6 @@ import base64
 import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -89,28 +88,21 @@ def _wide(png: bytes) -> int:
 
 
 def png_of_axes(draw: Callable[[], "Axes"]) -> bytes:
-    """Return the picture that `draw` makes in a new figure of pyplot, and close that figure."""
+    """Return the picture that `draw` makes in a new figure of pyplot, and close that figure.
+
+    Not within `pyplot.ioff`: if pyplot is imported there, its end leaves a notebook without figures.
+    """
     from matplotlib import pyplot
     from PIL import Image
 
-    _load_backend()
-    with pyplot.ioff():
-        figure = draw().get_figure(root=True)
-        assert figure is not None  # axes that were just made
-        try:
-            file = io.BytesIO()
-            figure.savefig(file, format="png", dpi=_DPI, facecolor="white")
-        finally:
-            pyplot.close(figure)
+    figure = draw().get_figure(root=True)
+    assert figure is not None  # axes that were just made
+    try:
+        file = io.BytesIO()
+        figure.savefig(file, format="png", dpi=_DPI, facecolor="white")
+    finally:
+        pyplot.close(figure)
     return _small(Image.open(file))
-
-
-@cache
-def _load_backend() -> None:
-    """Load the backend of pyplot, once: that of a notebook turns the interactive mode on, which `ioff` would undo."""
-    from matplotlib import pyplot
-
-    pyplot.switch_backend(pyplot.get_backend())
 
 
 def png_of_sheet(sheet: Sheet) -> bytes:

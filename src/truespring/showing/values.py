@@ -33,7 +33,12 @@ Picture = Callable[[], bytes]
 
 def html_of(value: Any) -> str:
     """Return a value as HTML for a notebook."""
-    return _CARDS[type(value)](value).html()
+    return card_of(value).html()
+
+
+def card_of(value: Any) -> Card:
+    """Return the card of a value."""
+    return _CARDS[type(value)](value)
 
 
 def _mesh(mesh: Mesh) -> Card:

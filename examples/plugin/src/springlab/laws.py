@@ -34,4 +34,5 @@ CIARLET = Law(
     trace=None,
     current=by_invariants(ciarlet, current=True),
     invariants=ciarlet,
+    constant_springs=True,
 )

@@ -21,6 +21,7 @@ from truespring.exports.forces.elements import (
     Points,
     Springs,
     VolumeTerm,
+    ZeroLengthSprings,
     floats,
 )
 from truespring.exports.forces.laws import Array, Law
@@ -70,8 +71,9 @@ def _parts(arrays: Mapping[str, Any], n_nodes: int) -> Iterator[Any]:
     if "stiffness" in arrays and constant:
         first, second = np.asarray(arrays["springs"]).T
         stiffness, rest = (np.asarray(arrays[name], dtype=float) for name in ("stiffness", "rest_length"))
+        nodes = Nodes(np.stack([first, second]), n_nodes)
         law = (str(arrays.get("force_law", "straight")), int(arrays.get("dimension", 3)))
-        yield Springs(Nodes(np.stack([first, second]), n_nodes), stiffness, rest, *law)
+        yield Springs(nodes, stiffness, rest, *law) if rest.any() else ZeroLengthSprings(nodes, stiffness)
     for kind in dict.fromkeys(_kind(name) for name in arrays if name.startswith(("mu", "kappa", "coupling"))):
         own = {name.removesuffix(kind): value for name, value in arrays.items() if name.endswith(kind)}
         elements = own.get("all_elements", own.get("corners", arrays["elements"]))

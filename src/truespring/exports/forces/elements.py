@@ -48,20 +48,36 @@ class Springs:
         a, b = self.nodes.take(x).swapaxes(0, 1)
         along = b - a
         square = (along**2).sum(axis=0)
-        k, L = self.stiffness, self.rest
-        if not L.any():
-            pull, energy = k * along, k / 2 * square
-        else:
-            length, d = np.sqrt(square), self.dimension
-            if self.law == "straight":
-                tension, energy = k * (length - L), k / 2 * (length - L) ** 2
-            else:  # neo-hookean
-                s = length / L
-                tension = k * L / (d + 2) * (s - s ** -(d + 1.0))
-                energy = k * L**2 / (d + 2) * (s**2 / 2 + s**-d / d - 1 / 2 - 1 / d)
-            pull = tension / length * along
+        k, L, length, d = self.stiffness, self.rest, np.sqrt(square), self.dimension
+        if self.law == "straight":
+            tension, energy = k * (length - L), k / 2 * (length - L) ** 2
+        else:  # neo-hookean
+            s = length / L
+            tension = k * L / (d + 2) * (s - s ** -(d + 1.0))
+            energy = k * L**2 / (d + 2) * (s**2 / 2 + s**-d / d - 1 / 2 - 1 / d)
+        pull = tension / length * along
         self.nodes.add(np.stack([-pull, pull], axis=1), gradient)
         return float(energy.sum())
+
+
+class ZeroLengthSprings:
+    """Springs of zero rest length with stiffness k [N/m]; each is listed at both of its nodes, in their order."""
+
+    def __init__(self, nodes: Nodes, stiffness: Array) -> None:
+        ends, others = nodes.numbers.ravel(), nodes.numbers[::-1].ravel()
+        order = np.argsort(ends, kind="stable")
+        self.ends, self.others, self.stiffness = ends[order], others[order], np.tile(stiffness, 2)[order]
+        self.own, self.starts = np.unique(self.ends, return_index=True)
+
+    def add(self, x: Array, gradient: Array) -> float:
+        """Add the gradient of the energy; return the energy."""
+        energy = 0.0
+        for place, into in zip(x, gradient, strict=True):
+            along = place[self.ends] - place[self.others]
+            pull = self.stiffness * along
+            into[self.own] += np.add.reduceat(pull, self.starts)
+            energy += float(pull @ along) / 4
+        return energy
 
 
 class Measure:

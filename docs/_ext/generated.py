@@ -1,0 +1,52 @@
+"""Sphinx extension: parts of pages that are made from the program, and docstrings as they are written.
+
+A fenced block ```` ```{generated} NAME ```` of a page is replaced by the text of an entry of PARTS.
+"""
+
+import re
+from pathlib import Path
+from typing import Any
+
+from commands import commands
+from public_names import public_names, write_pages
+from sources import rule_sources
+from study_keys import study_keys
+
+#: The parts by their names.
+PARTS = {"commands": commands, "public-names": public_names, "sources": rule_sources, "study-keys": study_keys}
+
+_BLOCK = re.compile(r"^```\{generated\} ([a-z-]+)\n```$", re.MULTILINE)
+
+# Signs that docstrings have in formulas and names, and that reStructuredText would read as marks.
+_MARK = re.compile(r"(?<!\\)([*|]|(?<=\w)_(?!\w))")
+
+
+def _read(app: Any, name: str, source: list[str]) -> None:
+    source[0] = _BLOCK.sub(lambda block: PARTS[block[1]](), source[0])
+
+
+def _docstring(app: Any, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Keep formulas: outside code, a star, a bar or a final underscore is itself."""
+    if what in ("attribute", "property", "data"):
+        lines.insert(0, "")  # else napoleon reads what is before a colon of the first line as a type
+    code = False
+    for number, line in enumerate(lines):
+        # Examples and literal blocks are code already.
+        code = line.lstrip().startswith((">>>", "...")) or (code and bool(line.strip()))
+        if code or line.startswith((".. ", ":")):
+            continue
+        parts = re.split(r"(``[^`]*``|`[^`]*`|:[a-z]+:`[^`]*`)", line)
+        lines[number] = "".join(part if k % 2 else _MARK.sub(r"\\\1", part) for k, part in enumerate(parts))
+
+
+def _pages(app: Any) -> None:
+    write_pages(Path(app.srcdir) / "reference" / "api")
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """Connect to the events of a build."""
+    app.connect("builder-inited", _pages)
+    app.connect("source-read", _read)
+    # Before napoleon, whose own marks stay.
+    app.connect("autodoc-process-docstring", _docstring, priority=100)
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
