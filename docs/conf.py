@@ -41,6 +41,7 @@ myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "
 myst_heading_anchors = 4
 nb_execution_mode = "off" if _quick else "cache"
 nb_execution_cache_path = str(ROOT / "out" / "notebooks")
+nb_execution_in_temp = True  # notebooks write files
 nb_execution_timeout = 600
 nb_execution_raise_on_error = not _quick
 nb_execution_show_tb = True
