@@ -128,6 +128,7 @@ ALLOWED = {
         "units",
     },
     "converging": {
+        "showing",
         "richardson",
         "comparison",
         "equilibrium",
@@ -143,6 +144,7 @@ ALLOWED = {
     "showing": {"comparison", "mesh", "models", "outputs", "potential", "problem", "report", "solution", "units"},
     "study": {
         "outputs",
+        "showing",
         "refining",
         "report",
         "comparison",

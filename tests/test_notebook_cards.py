@@ -4,6 +4,7 @@ import base64
 import io
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -153,3 +154,68 @@ def test_a_terminal_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     with ts.ProgressBar("a [b]") as bar:
         bar(0.5, 3, 1e-3)
     assert "a [b]" in screen.getvalue() and "iteration 3, residual 1e-03" in screen.getvalue()
+
+
+def test_a_comparison_with_markers_shows_the_springs_themselves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not the springs at the markers, which are a cloud of points."""
+    file = tmp_path / "markers.csv"
+    file.write_text("x [mm],y [mm],ux [mm],uy [mm]\n60,5,-1,-5\n20,12,0,-1\n", encoding="utf-8")
+    problem = ts.Problem(
+        mesh=ts.rectangle(size=(0.08, 0.02), elements=(4, 1)),
+        material=ts.Material(young=1e4, poisson=0.3),
+        section=ts.PlaneStress(thickness=0.01),
+        supports=[ts.Fixed(on="left")],
+        loads=[ts.Force(on="right", total=(0.0, -0.01))],
+    )
+    springs, markers = ts.solve(problem, ts.Springs(rule="gaussian")), ts.read_result(file)
+    drawn = []
+
+    def plot(solution: ts.Solution, over: ts.Solution, *options: object) -> Any:
+        drawn.append((solution, over))
+        return solution.plot(over=over)
+
+    monkeypatch.setattr("truespring.showing.values.plot_solution", plot)
+    assert Read(ts.compare(springs, markers)._repr_html_()).pictures
+    assert drawn == [(springs, markers)]
+
+
+# --- a real notebook --------------------------------------------------------------------------------
+
+CELLS = (
+    """import truespring as ts
+problem = ts.Problem(
+    ts.rectangle((0.04, 0.01), (4, 1)),
+    ts.Material(young=10e3, poisson=0.3),
+    ts.PlaneStress(thickness=0.01),
+    supports=[ts.Fixed("left")],
+    loads=[ts.Force("right", (0.1, 0.0))],
+)
+models = {"springs": ts.Springs("gaussian"), "fem": ts.Fem("neo-hookean")}
+result = ts.verify(problem, models=models, refine=False)
+result""",
+    "result.solutions['springs'].plot();",
+)
+
+
+@pytest.mark.verification
+def test_a_notebook_shows_progress_values_and_figures() -> None:
+    """A figure is shown after a card, too, whose picture is drawn by the same library."""
+    nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    shown: list[str] = []
+
+    class Client(nbclient.NotebookClient):  # type: ignore[misc, name-defined]
+        def process_message(self, message: Any, cell: Any, number: int) -> Any:
+            if "display_data" in message["msg_type"]:
+                shown.append(message["content"]["data"].get("text/html", ""))
+            return super().process_message(message, cell, number)
+
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(text) for text in CELLS])
+    Client(notebook, timeout=120, kernel_name="python3").execute()
+    progress, value = notebook.cells[0].outputs
+    assert 'value="1" max="1"' in shown[-3] and progress.data["text/html"] == ""
+    read = Read(value.data["text/html"])
+    assert "Result: problem" in read.texts and len(read.pictures) == 1
+    (figure,) = notebook.cells[1].outputs
+    assert figure.data["image/png"]

@@ -12,7 +12,7 @@ import lazy_loader
 # The names are listed in __init__.pyi, each once, and imported on first use: the command line starts at once.
 _attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
-# Messages of the library: silent unless the program that uses it asks for them, see docs/reference/logging.md.
+# Messages of the library: silent unless the program that uses it asks for them, see docs/reference/progress.md.
 logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 # Names of earlier releases and their successors; removed in the next release.

@@ -3,15 +3,17 @@
 import csv
 import json
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truespring.converging.figures import settling_figures
-from truespring.converging.page import render_settling
+from truespring.converging.page import render_settling, settling_rows
 from truespring.converging.settling import Refinement
 from truespring.outputs import Output
 from truespring.report.drawing import Figures, sheets
 from truespring.report.rows import table_of
+from truespring.showing.cards import Card, png_of_sheet
 
 if TYPE_CHECKING:
     import polars
@@ -27,6 +29,13 @@ class StudyRefinement(Refinement):
 
     title: str
     file: Path
+
+    def _repr_html_(self) -> str:
+        """Return the watched quantities as HTML for a notebook: a table and the first figure."""
+        figures = list(self.figures().values())
+        columns = ("model", "", "value", "order", "at h = 0", "error", "")
+        picture = partial(png_of_sheet, figures[0]) if figures else None
+        return Card(f"Refinement: {self.title}", (), self.sentence, columns, list(settling_rows(self)), picture).html()
 
     @property
     def rows(self) -> list[dict[str, Any]]:

@@ -88,18 +88,20 @@ def _wide(png: bytes) -> int:
 
 
 def png_of_axes(draw: Callable[[], "Axes"]) -> bytes:
-    """Return the picture that `draw` makes in a new figure of pyplot, and close that figure."""
+    """Return the picture that `draw` makes in a new figure of pyplot, and close that figure.
+
+    Not within `pyplot.ioff`: if pyplot is imported there, its end leaves a notebook without figures.
+    """
     from matplotlib import pyplot
     from PIL import Image
 
-    with pyplot.ioff():
-        figure = draw().get_figure(root=True)
-        assert figure is not None  # axes that were just made
-        try:
-            file = io.BytesIO()
-            figure.savefig(file, format="png", dpi=_DPI, facecolor="white")
-        finally:
-            pyplot.close(figure)
+    figure = draw().get_figure(root=True)
+    assert figure is not None  # axes that were just made
+    try:
+        file = io.BytesIO()
+        figure.savefig(file, format="png", dpi=_DPI, facecolor="white")
+    finally:
+        pyplot.close(figure)
     return _small(Image.open(file))
 
 

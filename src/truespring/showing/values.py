@@ -33,7 +33,12 @@ Picture = Callable[[], bytes]
 
 def html_of(value: Any) -> str:
     """Return a value as HTML for a notebook."""
-    return _CARDS[type(value)](value).html()
+    return card_of(value).html()
+
+
+def card_of(value: Any) -> Card:
+    """Return the card of a value."""
+    return _CARDS[type(value)](value)
 
 
 def _mesh(mesh: Mesh) -> Card:
@@ -86,7 +91,7 @@ def _comparison(comparison: Comparison) -> Card:
     rows += [] if up_to is None else [(f"within {percent(comparison.tolerance)} up to", f"load factor {up_to:g}")]
     rows += [("nodes outside of the other body", str(comparison.n_outside))] if comparison.n_outside else []
     title = f"Comparison: {comparison.model.label} against {comparison.reference.label}"
-    return Card(title, rows, picture=_pair(comparison.model, comparison.reference))
+    return Card(title, rows, picture=_pair(*comparison.known_on))
 
 
 def _moduli(moduli: Moduli) -> Card:

@@ -13,6 +13,7 @@ from truespring.material import SECTIONS, Section
 from truespring.mesh import Mesh
 from truespring.models import SpringNetwork, check_fibres
 from truespring.problem import Problem
+from truespring.showing.values import card_of
 from truespring.study.case import Case
 from truespring.study.changes import changed
 from truespring.study.faults import fault_lines
@@ -44,6 +45,12 @@ class Study(Case):
     def __repr__(self) -> str:
         mesh = self.problem.mesh
         return f"Study({str(self.file)!r}, {mesh.n_nodes} nodes, models: {', '.join(self.entries)})"
+
+    def _repr_html_(self) -> str:
+        """Return the study as HTML for a notebook: a table and a picture."""
+        models = [(f"model {name}", entry.label_on(self.problem)) for name, entry in self.entries.items()]
+        own = card_of(self.problem)
+        return replace(own, title=f"Study: {self.title}", rows=[*own.rows, *models]).html()
 
     @property
     def file(self) -> Path:

@@ -3,13 +3,14 @@
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truespring.outputs import Output
 from truespring.report.drawing import Figures, sheets
 from truespring.report.rows import table_of
+from truespring.showing.cards import Card, png_of_sheet
 from truespring.sweeping.figures import sweep_figures
 from truespring.sweeping.plan import Plan
 from truespring.sweeping.store import FAILED
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     import polars
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sweep:
     """The results of a sweep.
 
@@ -42,6 +43,19 @@ class Sweep:
     records: Mapping[str, Mapping[str, Any]]
     n_before: int
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        counted = f"{len(self.records)} points, {self.n_failed} failed"
+        return f"Sweep({str(self.plan.text.file)!r} over {', '.join(self.plan.keys)}: {counted})"
+
+    def _repr_html_(self) -> str:
+        """Return the varied values, status and errors as HTML for a notebook: a table and the first figure."""
+        figures = list(self.figures().values())
+        errors = sorted({key for row in self.rows for key in row if key.endswith(".rms_error")})
+        columns = (*self.plan.keys, "status", *errors)
+        table = [[_cell(row.get(key)) for key in columns] for row in self.rows]
+        picture = partial(png_of_sheet, figures[0]) if figures else None
+        return Card("Sweep", (), repr(self), columns, table, picture).html()
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
@@ -100,6 +114,11 @@ class Sweep:
         text = f"ts.sweep(...){access} as a table is deprecated, use ts.sweep(...).table(){access}"
         warnings.warn(text, DeprecationWarning, stacklevel=3)
         return self.table()
+
+
+def _cell(value: Any) -> str:
+    """Return a value of a row as text for a notebook."""
+    return "–" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def write_sweep(done: Sweep, out: Path, command: str | None = None) -> Path:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import polars
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Validity(Maps):
     """Maps of a study; the attributes are those of `Maps`.
 
@@ -29,6 +29,10 @@ class Validity(Maps):
         >>> found.converged, list(found.figures())
         (True, ['validity_stretch_lloyd'])
     """
+
+    def __repr__(self) -> str:
+        drawn = ", ".join(f"{one.load.name}: {one.rule.name}" for one in self.maps)
+        return f"Validity({self.title!r}, {drawn}, against {self.law} FEM)"
 
     @property
     def verdicts(self) -> list[str]:
