@@ -20,7 +20,7 @@ test: .venv/test
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q -n 2 -m "not verification"
 
-# Runs the long tests, those of PETSc if it is installed, and rebuilds docs/verification.md and the picture of the README.
+# Runs the long tests, those of PETSc if it is installed, and rebuilds docs/verification.md and the pictures of the pages.
 verification: .venv/test $(if $(wildcard $(PETSC_DIR)/include/petscversion.h),.venv/petsc)
 	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m verification
 	$(BIN)/python docs/build_verification.py

@@ -1,4 +1,4 @@
-"""Rebuild docs/images/springs_over_fem.png, the README's picture: the shipped studies at full load.
+"""Rebuild docs/images/springs_over_fem.png, the picture of docs/accuracy/studies.md: the shipped studies at full load.
 
 Run from the root of the repository: python docs/build_picture.py (or make verification).
 """

@@ -379,7 +379,7 @@ def shipped_studies() -> str:
 
 
 def against_the_truth() -> str:
-    """Springs of the shipped studies in the plane against each law refined: the table of the README.
+    """Springs of the shipped studies in the plane against each law refined: the table of docs/accuracy/studies.md.
 
     The refined elements are of second order on a mesh refined twice. Four-node elements on the mesh of the springs are
     included for comparison.

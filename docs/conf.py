@@ -62,7 +62,13 @@ python_maximum_signature_line_length = 88
 sphinx_gallery_conf = {
     "examples_dirs": str(ROOT / "examples" / "gallery"),
     "gallery_dirs": "gallery",
+    "subsection_order": [
+        f"../examples/gallery/{section}" for section in ("loads", "stability", "contact", "motion", "accuracy")
+    ],
     "filename_pattern": r"\.py$",
+    "copyfile_regex": r".*\.(frd|inp|msh)",
+    "capture_repr": (),
+    "matplotlib_animations": (True, "jshtml"),
     "plot_gallery": not _quick,
     "download_all_examples": False,
     "remove_config_comments": True,

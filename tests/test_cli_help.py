@@ -43,10 +43,13 @@ def check_command(line: str, folder: Path) -> None:
         assert file in ("job.frd", "bracket.toml") or (folder / file.partition(":")[0]).is_file(), f"{line}: {file}"
 
 
-def test_commands_of_the_readme_are_right(started: Path) -> None:
-    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+def test_commands_of_the_first_pages_are_right(started: Path) -> None:
+    pages = (EXAMPLES.parent / "README.md", *sorted((EXAMPLES.parent / "docs" / "start").glob("*.md")))
     lines = [
-        line for line in readme.splitlines() if line.startswith("truespring ") and not line.startswith("truespring b")
+        line
+        for page in pages
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if line.startswith("truespring ")
     ]
     assert len(lines) > 12
     for line in lines:

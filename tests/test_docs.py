@@ -3,9 +3,12 @@
 import json
 import re
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
+from matplotlib import pyplot
 
 from tests.names import missing, named_files
 from tests.test_examples import EXAMPLES
@@ -15,24 +18,40 @@ from truespring.study import read_study, run
 from truespring.study.schema import MODEL_KINDS, StudyKeys
 
 ROOT = EXAMPLES.parent
-SECTIONS = ("", "export", "howto", "coming-from")
+SECTIONS = ("", "accuracy", "coming-from", "export", "howto", "reference", "start", "theory")
+STUDIES = ROOT / "docs" / "accuracy" / "studies.md"
 PAGES = [ROOT / "README.md", *(page for one in SECTIONS for page in sorted((ROOT / "docs" / one).glob("*.md")))]
 
 
-def blocks(language: str) -> list[tuple[str, str]]:
-    """Page and text of every fenced block of a language."""
+#: Sections of many pages: their Python runs in verification, their studies in test_pages.py.
+MANY = ("docs/howto/", "docs/coming-from/")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page; the long ones, under <!-- long -->, run in verification."""
+
+    page: str
+    text: str
+    long: bool
+
+
+def blocks(language: str) -> list[Block]:
+    fence = re.compile(rf"^(<!-- long -->\n)?```{language}\n(.*?)^```", re.DOTALL | re.MULTILINE)
     return [
-        (page.relative_to(ROOT).as_posix(), text)
+        Block(page.relative_to(ROOT).as_posix(), text, bool(long))
         for page in PAGES
-        for text in re.findall(
-            rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
-        )
+        for long, text in fence.findall(page.read_text(encoding="utf-8"))
     ]
 
 
-def in_section(page: str) -> bool:
-    """Return whether a page is one of many of a section: its code runs in verification, see also test_pages.py."""
-    return page.startswith(("docs/howto/", "docs/coming-from/"))
+def pages_of_python() -> list[Any]:
+    """Return pages, and whether their long blocks run."""
+    found = {(one.page, one.long) for one in blocks("python")}
+    return [
+        pytest.param(page, long, marks=[pytest.mark.verification] if long or page.startswith(MANY) else [])
+        for page, long in sorted(found)
+    ]
 
 
 def test_the_pages_hold_code() -> None:
@@ -40,22 +59,31 @@ def test_the_pages_hold_code() -> None:
     assert len(blocks("toml")) >= 2
 
 
-@pytest.mark.parametrize(
-    ("page", "code"),
-    [pytest.param(*one, marks=[pytest.mark.verification] if in_section(one[0]) else []) for one in blocks("python")],
-)
-def test_python_on_the_pages_runs(page: str, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("page", "long"), pages_of_python())
+def test_python_on_the_pages_runs(page: str, long: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blocks of a page follow each other: each may use the names of those before it."""
     monkeypatch.chdir(tmp_path)  # some write files
     shutil.copytree(EXAMPLES, tmp_path / "examples")  # as where one stands in the project
     for name, text in named_files((ROOT / page).read_text(encoding="utf-8")).items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    exec(compile(code, page, "exec"), {})
+    known: dict[str, object] = {}
+    for one in blocks("python"):
+        if one.page == page and one.long <= long:
+            exec(compile(one.text, page, "exec"), known)
+    pyplot.close("all")
 
 
-@pytest.mark.parametrize(("page", "text"), [one for one in blocks("toml") if not in_section(one[0])])
-def test_studies_on_the_pages_run(page: str, text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "block",
+    [
+        pytest.param(one, marks=[pytest.mark.verification] if one.long else [])
+        for one in blocks("toml")
+        if not one.page.startswith(MANY)
+    ],
+)
+def test_studies_on_the_pages_run(block: Block, tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(block.text, encoding="utf-8")
     for table in (ROOT / "examples").glob("*.csv"):
         shutil.copy(table, tmp_path)
     assert run(read_study(file)).converged
@@ -94,14 +122,16 @@ def test_a_short_name_is_not_found_in_a_longer_word() -> None:
     assert missing(["linear", "quadratic"], "nonlinear, bi-quadratic, `quadratic`") == {"linear"}
 
 
-def test_the_table_of_the_readme_is_against_the_truth_of_each_law() -> None:
+def test_the_tables_of_errors_are_against_the_truth_of_each_law() -> None:
     """Its figures are those of a mesh twice refined; the studies themselves tell them to a fifth of a percent."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    pages = [page.read_text(encoding="utf-8") for page in (ROOT / "README.md", STUDIES)]
     results = [run(read_study(EXAMPLES / f"{name}.toml")) for name in ("stretching", "bending")]
     for name in results[0].comparisons:
         label = results[0].paths[name].label
-        row = re.search(rf"^\| {re.escape(label)} \| ([\d.]+) % \| ([\d.]+) % \|", readme, re.MULTILINE)
-        assert row is not None, label
+        readme, row = (
+            re.search(rf"^\| {re.escape(label)} \| ([\d.]+) % \| ([\d.]+) % \|", page, re.MULTILINE) for page in pages
+        )
+        assert row is not None and readme is not None and row.groups() == readme.groups(), label
         for shown, result in zip(row.groups(), results, strict=True):
             error = result.standings[name].refined_error
             assert error is not None
@@ -109,10 +139,10 @@ def test_the_table_of_the_readme_is_against_the_truth_of_each_law() -> None:
 
 
 @pytest.mark.verification
-def test_the_table_of_the_readme_is_that_of_the_page_that_measures_it() -> None:
+def test_the_tables_of_errors_are_those_of_the_page_that_measures_them() -> None:
     from docs.build_verification import against_the_truth
 
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    readme, page = (page.read_text(encoding="utf-8").replace("*", "") for page in (ROOT / "README.md", STUDIES))
     rows = re.findall(r"^\| (.*): (.*) \| (.*)% \| (.*)% \|$", against_the_truth(), re.MULTILINE)
     shown = {
         (model, law): " | ".join(f"{float(one):.{0 if float(one) > 10 else 1}f} %" for one in found)
@@ -122,7 +152,8 @@ def test_the_table_of_the_readme_is_that_of_the_page_that_measures_it() -> None:
     laws = {law for _, law in shown}
     assert len(laws) == 4
     for law in laws:
-        assert f"| {law} | {' | '.join(shown[model, law] for model in models)} |" in readme.replace("*", "")
+        assert f"| {law} | {' | '.join(shown[model, law] for model in models)} |" in page
+        assert f"| {law} | {' | '.join(shown[model, law] for model in models[:2])} |" in readme
 
 
 def test_the_page_on_hourglass_is_that_of_its_values() -> None:

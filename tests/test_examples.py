@@ -49,7 +49,7 @@ def test_every_example_is_run_here() -> None:
 @pytest.mark.verification
 @pytest.mark.parametrize("name", MOVING)
 def test_the_errors_of_the_shipped_motions_are_separate(name: str) -> None:
-    """The figures of README.md for the gripped block; the liver's probe presses and rubs; a session lets go."""
+    """Figures of docs/accuracy/studies.md: the gripped block; the liver's probe presses and rubs; a session lets go."""
     result = run(read_study(EXAMPLES / f"{name}.toml"))
     assert result.converged, [path.warnings for path in result.paths.values()]
     model, splits = result.comparisons["fem"].rms_error, result.splits
@@ -182,14 +182,15 @@ def test_springs_on_an_imported_mesh_are_finite_elements() -> None:
 
 
 @pytest.mark.verification
-def test_the_readme_tells_what_the_studies_in_space_give() -> None:
-    readme = " ".join((EXAMPLES.parent / "README.md").read_text(encoding="utf-8").split())
+def test_the_page_of_studies_tells_what_those_in_space_give() -> None:
+    page = EXAMPLES.parent / "docs" / "accuracy" / "studies.md"
+    told = " ".join(page.read_text(encoding="utf-8").split())
     block, tissue = (summary(run(read_study(EXAMPLES / f"{name}.toml"))) for name in ("soft_block", "tissue"))
     errors = block["comparison"]
-    assert f"{100 * errors['neo-hookean']['refined_error']:.1f} % against neo-Hookean" in readme
-    assert f"{100 * errors['linear']['refined_error']:.0f} % against linear" in readme
+    assert f"{100 * errors['neo-hookean']['refined_error']:.1f} % against neo-Hookean" in told
+    assert f"{100 * errors['linear']['refined_error']:.0f} % against linear" in told
     refined = {name: 100 * one["refined_error"] for name, one in tissue["comparison"].items()}
-    assert f"an rms error of {refined['neo-hookean']:.1f} % against refined neo-Hookean FEM" in readme
+    assert f"an rms error of {refined['neo-hookean']:.1f} % against refined neo-Hookean FEM" in told
 
 
 def test_the_organ_is_what_its_image_holds() -> None:

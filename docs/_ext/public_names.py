@@ -22,6 +22,7 @@ TOPICS: dict[str, tuple[str, ...]] = {
             "Box",
             "Near",
             "Plane",
+            "mapped",
             "named_point",
             "nearest_node",
         ),

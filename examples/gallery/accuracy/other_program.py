@@ -12,8 +12,8 @@ import numpy as np
 import truespring as ts
 
 # %%
-# ``block.inp`` is the input of CalculiX, ``block.frd`` is the output of ``ccx block``;
-# both lie beside this script, in millimetres and newtons.
+# The input of CalculiX, :download:`block.inp`, and its output by ``ccx block``,
+# :download:`block.frd`, lie beside this script, in millimetres and newtons.
 mesh = ts.read_mesh("block.inp", unit="mm")
 calculix = ts.read_result("block.frd", unit="mm")
 print(calculix, "with the node sets", sorted(mesh.node_groups))

@@ -12,8 +12,8 @@ import numpy as np
 import truespring as ts
 
 # %%
-# The mesh lies beside this script, with the .geo file that gmsh made it from. It is a
-# quarter, in millimetres.
+# The mesh, :download:`two_tissues.msh`, lies beside this script, with the .geo file
+# that gmsh made it from. It is a quarter, in millimetres.
 mesh = ts.read_mesh("two_tissues.msh", unit="mm")
 print(mesh, sorted(mesh.element_groups), sorted(mesh.facet_groups))
 

@@ -10,9 +10,9 @@ from truespring.report.legend import ROW, Entry, draw_legend, legend_columns
 from truespring.report.lines import draw_lines
 from truespring.report.sheet import Area, Sheet
 from truespring.report.style import BLUE, FAINT, INK, LOAD
-from truespring.report.surfaces import edges_of, facets_of
+from truespring.report.surfaces import edges_of, facets_of, normals, outline
 from truespring.report.touching import view
-from truespring.report.words import draw_words
+from truespring.report.words import draw_words, text_width
 
 _WIDTH, _HIGHEST, _SIDE = 5.6, 4.4, 0.15
 _DASHES = (0, (3, 2))
@@ -25,14 +25,14 @@ def shape_figure(one: CaseResult) -> Sheet | None:
     if not shared:
         return None
     level, mesh = shared[-1], one.case.problem.mesh
-    lines = mesh.edges if mesh.dim == 2 or not len(facets_of(mesh)) else edges_of(facets_of(mesh))
     known = _reference(one, level)
-    drawn = [("undeformed", FAINT, 0.7, view(mesh.nodes)[..., :2], _outline(mesh, lines))]
+    drawn = [("undeformed", FAINT, 0.7, view(mesh.nodes)[..., :2], _outline(mesh))]
     if known is not None and known[1] is not None:
-        drawn.append((one.case.against, INK, 1.5, known[0], lines))
-    drawn.append(("by the rule", LOAD, 1.0, _places(one.before, level), lines))
-    drawn.append(("calibrated", BLUE, 1.0, _places(one.after, level), lines))
-    markers = known[0] if known is not None and known[1] is None else None
+        drawn.append((one.case.against, INK, 1.5, known[0][:, :2], _edges(mesh, known[0])))
+    for name, color, path in (("by the rule", LOAD, one.before), ("calibrated", BLUE, one.after)):
+        places = _places(path, level)
+        drawn.append((name, color, 1.0, places[:, :2], _edges(mesh, places)))
+    markers = known[0][:, :2] if known is not None and known[1] is None else None
     role = "held out" if one.held_out else "fitted"
     title = f"{one.case.name} ({role}): the body before and after, at load factor {level:.4g}"
     return _sheet(title, drawn, markers, one.case.against)
@@ -50,7 +50,8 @@ def _sheet(title: str, drawn: list[_Drawn], markers: Floats | None, against: str
     legend += [Entry(f"markers of {against}", INK, "o", "")] if markers is not None else []
     columns, wide = legend_columns(legend, _WIDTH)
     top = 0.4 + ROW * len(columns[0])
-    sheet = Sheet(max(_WIDTH, wide + 2 * _SIDE), size[1] + 2 * _SIDE + top, title)
+    widest = max(_WIDTH, wide + 2 * _SIDE, text_width(title, 9, bold=True) + 2 * _SIDE)
+    sheet = Sheet(widest, size[1] + 2 * _SIDE + top, title)
     draw_words(sheet, _SIDE, sheet.height - 0.17, title, 9, bold=True)
     draw_legend(sheet, columns, _SIDE, sheet.height - 0.32)
     x, y = zip(lower, lower + extent, strict=True)
@@ -70,15 +71,27 @@ def _draw_markers(area: Area, points: Floats) -> None:
     area.add(Line2D(*points.T, ls="", marker="o", ms=3.5, mfc="white", mec=INK, mew=1.0, zorder=9, clip_on=False))
 
 
-def _outline(mesh: Mesh, lines: Ints) -> Ints:
-    return mesh.boundary if mesh.dim == 2 and mesh.boundary.shape[1] == 2 else lines
+def _outline(mesh: Mesh) -> Ints:
+    """Return the lines of the undeformed body: its boundary, in space its outline."""
+    facets = facets_of(mesh)
+    if len(facets):
+        return outline(view(mesh.nodes), facets, silhouette=True)
+    return mesh.boundary if mesh.dim == 2 and mesh.boundary.shape[1] == 2 else mesh.edges
+
+
+def _edges(mesh: Mesh, places: Floats) -> Ints:
+    """Return the edges of a body at `places` in the coordinates of the view, in space those that face the eye."""
+    facets = facets_of(mesh)
+    if not len(facets):
+        return mesh.edges
+    return edges_of(facets[normals(places, facets)[:, 2] > 0])
 
 
 def _places(path: Solution, level: float) -> Floats:
-    """Return the deformed nodes in the picture plane [m], shape (n_nodes, 2)."""
+    """Return the deformed nodes in the coordinates of the view [m], shape (n_nodes, dim)."""
     state = path.at(level)
     assert state is not None  # shape_figure
-    return view(state.positions)[:, :2]
+    return view(state.positions)
 
 
 def _reference(one: CaseResult, level: float) -> tuple[Floats, Ints | None] | None:
@@ -87,7 +100,7 @@ def _reference(one: CaseResult, level: float) -> tuple[Floats, Ints | None] | No
     if case.field is not None:
         path, nodes = case.field
         state = path.at(level)
-        return None if state is None else (view(state.positions)[:, :2], nodes)
+        return None if state is None else (view(state.positions), nodes)
     state = None if case.reference is None or not case.reference.states else case.reference.at(level)
     dim = case.problem.mesh.dim
-    return None if state is None else (view(state.all_positions[:, :dim])[:, :2], None)
+    return None if state is None else (view(state.all_positions[:, :dim]), None)
