@@ -4,6 +4,7 @@ import base64
 import io
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -153,6 +154,31 @@ def test_a_terminal_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     with ts.ProgressBar("a [b]") as bar:
         bar(0.5, 3, 1e-3)
     assert "a [b]" in screen.getvalue() and "iteration 3, residual 1e-03" in screen.getvalue()
+
+
+def test_a_comparison_with_markers_shows_the_springs_themselves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not the springs at the markers, which are a cloud of points."""
+    file = tmp_path / "markers.csv"
+    file.write_text("x [mm],y [mm],ux [mm],uy [mm]\n60,5,-1,-5\n20,12,0,-1\n", encoding="utf-8")
+    problem = ts.Problem(
+        mesh=ts.rectangle(size=(0.08, 0.02), elements=(4, 1)),
+        material=ts.Material(young=1e4, poisson=0.3),
+        section=ts.PlaneStress(thickness=0.01),
+        supports=[ts.Fixed(on="left")],
+        loads=[ts.Force(on="right", total=(0.0, -0.01))],
+    )
+    springs, markers = ts.solve(problem, ts.Springs(rule="gaussian")), ts.read_result(file)
+    drawn = []
+
+    def plot(solution: ts.Solution, over: ts.Solution, *options: object) -> Any:
+        drawn.append((solution, over))
+        return solution.plot(over=over)
+
+    monkeypatch.setattr("truespring.showing.values.plot_solution", plot)
+    assert Read(ts.compare(springs, markers)._repr_html_()).pictures
+    assert drawn == [(springs, markers)]
 
 
 # --- a real notebook --------------------------------------------------------------------------------

@@ -84,23 +84,23 @@ def test_a_study_of_a_page_is_solved(study: dict[str, Any], page: Path, tmp_path
     assert found.converged, {name: path.warnings for name, path in found.paths.items()}
 
 
-def commands() -> list[tuple[str, str]]:
-    """Return page and command line of each call of truespring in a block of shell commands."""
+def commands() -> dict[str, str]:
+    """Return the page of each command line of truespring in a block of shell commands."""
     pages = sorted(page for page in ROOT.glob("docs/**/*.md") if "_build" not in page.parts)
-    return [
-        (page.relative_to(ROOT).as_posix(), line)
+    return {
+        line: page.relative_to(ROOT).as_posix()
         for page in (ROOT / "README.md", *pages)
         if page.name != "extending.md"  # its commands need the plugin of the examples
         for block in re.findall(r"^```sh\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
         for line in block.splitlines()
         if re.match(r"truespring [a-z]", line) and "STUDY" not in line
-    ]
+    }
 
 
 def test_command_lines_of_the_pages_are_accepted() -> None:
     lines = commands()
     assert len(lines) > 60
-    for page, line in lines:
+    for line, page in lines.items():
         words = shlex.split(re.split(r"\s[|>&]\s", line)[0], comments=True)[1:]
         assert words[0] in VERBS, f"{page}: {line}"
         try:

@@ -52,7 +52,7 @@ def test_the_page_of_tutorials_shows_each_with_a_picture() -> None:
 @pytest.mark.verification
 @names
 def test_a_tutorial_runs(page: Path, tmp_path: Path) -> None:
-    """A notebook runs to its end in an empty folder, and leaves nothing beside its page."""
+    """A notebook runs to its end in an empty folder, shows its pictures, and leaves nothing beside its page."""
     jupytext = pytest.importorskip("jupytext")
     nbclient = pytest.importorskip("nbclient")
     before = sorted(TUTORIALS.iterdir())
@@ -60,5 +60,8 @@ def test_a_tutorial_runs(page: Path, tmp_path: Path) -> None:
     nbclient.NotebookClient(
         notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
     ).execute()
-    assert any(cell.get("outputs") for cell in notebook.cells)
+    drawing = [cell for cell in notebook.cells if re.search(r"subplots\(|\.plot\(", cell.source) and "outputs" in cell]
+    assert drawing
+    for cell in drawing:
+        assert any("image/png" in output.get("data", {}) for output in cell.outputs), cell.source
     assert sorted(TUTORIALS.iterdir()) == before

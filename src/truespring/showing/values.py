@@ -91,7 +91,7 @@ def _comparison(comparison: Comparison) -> Card:
     rows += [] if up_to is None else [(f"within {percent(comparison.tolerance)} up to", f"load factor {up_to:g}")]
     rows += [("nodes outside of the other body", str(comparison.n_outside))] if comparison.n_outside else []
     title = f"Comparison: {comparison.model.label} against {comparison.reference.label}"
-    return Card(title, rows, picture=_pair(comparison.model, comparison.reference))
+    return Card(title, rows, picture=_pair(*comparison.known_on))
 
 
 def _moduli(moduli: Moduli) -> Card:
