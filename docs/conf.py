@@ -26,6 +26,7 @@ extensions = [
     "sphinx_copybutton",
     "generated",
     "notebooks",
+    "placeholders",
 ]
 exclude_patterns = [
     "_build",

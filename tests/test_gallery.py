@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from docs._ext.placeholders import stale
 
 import truespring
 
@@ -72,3 +73,13 @@ def test_a_script_runs_without_a_warning_and_draws(script: Path) -> None:
     )
     assert run.returncode == 0, run.stderr[-3000:]
     assert set(script.parent.iterdir()) == before
+
+
+def test_placeholders_of_scripts_that_did_not_run_are_stale(tmp_path: Path) -> None:
+    """sphinx-gallery shows NAME_thumb.png before NAME_thumb.gif, also if only the latter is of the script."""
+    thumbs = tmp_path / "motion" / "images" / "thumb"
+    thumbs.mkdir(parents=True)
+    for name in ("ran", "did_not_run"):
+        (thumbs / f"sphx_glr_{name}_thumb.png").touch()
+    (tmp_path / "motion" / "ran.py.md5").touch()
+    assert [thumb.name for thumb in stale(tmp_path)] == ["sphx_glr_did_not_run_thumb.png"]

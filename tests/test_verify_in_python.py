@@ -68,6 +68,8 @@ def test_a_problem_is_verified_with_models(problem: ts.Problem, tmp_path: Path) 
     assert result.problem.mesh.nodes[result.probe].tolist() == [0.04, 0.0]
     assert (tmp_path / "my-body" / "summary.json").exists()
     assert "Repeat this run" not in (tmp_path / "report.html").read_text("utf-8")
+    fewer = ts.verify(problem, models=MODELS, model="fem", references=["linear"], refine=False)
+    assert fewer.model == "fem" and list(fewer.comparisons) == ["linear"]
     alone = ts.solve(problem, MODELS["springs"])
     assert (result.solutions["springs"].states[-1].displacement == alone.states[-1].displacement).all()
 
@@ -81,6 +83,8 @@ def test_a_problem_is_verified_with_models(problem: ts.Problem, tmp_path: Path) 
         ({"models": MODELS, "tolerance": 3}, "tolerance = 3"),
         ({"models": MODELS, "probe": "rigt"}, "did you mean 'right'"),
         ({"models": MODELS, "probe": 10}, "10 nodes"),
+        ({"models": MODELS, "model": "spring"}, "'spring' is not among the models .did you mean 'springs'"),
+        ({"models": MODELS, "references": ["fem", "springs"]}, "the compared model itself"),
     ],
 )
 def test_wrong_models_and_options_are_errors(problem: ts.Problem, given: dict[str, object], words: str) -> None:

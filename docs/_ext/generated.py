@@ -22,7 +22,9 @@ _MARK = re.compile(r"(?<!\\)([*|]|(?<=\w)_(?!\w))")
 
 
 def _read(app: Any, name: str, source: list[str]) -> None:
-    source[0] = _BLOCK.sub(lambda block: PARTS[block[1]](), source[0])
+    if _BLOCK.search(source[0]):
+        app.env.note_reread()  # the program may have changed
+        source[0] = _BLOCK.sub(lambda block: PARTS[block[1]](), source[0])
 
 
 def _docstring(app: Any, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:

@@ -41,6 +41,8 @@ def verify(
     progress: bool | Progress = True,
     *,
     models: Mapping[str, Model | Potential] | None = None,
+    model: str | None = None,
+    references: Sequence[str] | None = None,
     solver: Solver | None = None,
     probe: int | str | Sequence[float] | None = None,
     tolerance: float | None = None,
@@ -62,6 +64,8 @@ def verify(
             load factor reached.
         models: of a problem, the models by name, as in the example. This argument and those up to `title` are for a
             problem; a study has its own values.
+        model: name of the model that is compared with the others; by default the first springs.
+        references: names of the models that it is compared with; by default all others.
         solver: Newton by default.
         probe: node number, named point such as "right-middle", or position [m]; by default the node that moves most.
         tolerance: largest error at which two models agree, 0.05 by default.
@@ -88,7 +92,15 @@ def verify(
         >>> f"{result.comparison.rms_error:.1%}"
         '0.6%'
     """
-    options = {"solver": solver, "probe": probe, "tolerance": tolerance, "refine": refine, "title": title}
+    options = {
+        "model": model,
+        "references": references,
+        "solver": solver,
+        "probe": probe,
+        "tolerance": tolerance,
+        "refine": refine,
+        "title": title,
+    }
     case = _case(study, models, {key: value for key, value in options.items() if value is not None})
     folder = None if out is None else Path(out)
     ((result, _),) = verify_each([case], folder, lambda: chosen(progress, bars), timeout=timeout, animate=animate)

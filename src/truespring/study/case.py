@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from truespring.comparison import TOLERANCE
-from truespring.errors import MeshError, ProblemError
+from truespring.errors import MeshError, ProblemError, nearest
 from truespring.mesh import Mesh, named_point, nearest_node
 from truespring.models import Model, as_model, check_fibres
 from truespring.potential import Potential
@@ -64,6 +64,8 @@ def case_of(
     problem: Problem,
     models: Mapping[str, Model | Potential],
     *,
+    model: str | None = None,
+    references: Sequence[str] | None = None,
     solver: Solver | None = None,
     probe: int | str | Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
@@ -72,8 +74,9 @@ def case_of(
 ) -> Case:
     """Return the case of a problem with models by name, which are compared as those of a study.
 
-    Raises ProblemError if there is no model, if a name cannot be that of a file, or if `tolerance` is not between 0
-    and 1, ModelError if a model has the wrong type or does not fit the problem, MeshError if the probe does not exist.
+    Raises ProblemError if there is no model, if a name is unknown or cannot be that of a file, or if `tolerance` is
+    not between 0 and 1, ModelError if a model has the wrong type or does not fit the problem, MeshError if the probe
+    does not exist.
     """
     if not models:
         raise ProblemError("verify needs models: models={'springs': Springs(rule='gaussian'), 'fem': Fem(...)}")
@@ -85,14 +88,14 @@ def case_of(
     entries = {name: as_model(model) for name, model in models.items()}
     for entry in entries.values():
         check_fibres(problem, entry)
-    model = compared_model(entries)
+    compared = compared_model(entries, model)
     return Case(
         title=title,
         problem=problem,
         solver=Newton() if solver is None else as_solver(solver),
         entries=entries,
-        model=model,
-        references=tuple(name for name in entries if name != model),
+        model=compared,
+        references=reference_names(entries, compared, references),
         probe=None if probe is None else _node(problem.mesh, probe),
         tolerance=tolerance,
         refine=refine,
@@ -110,7 +113,33 @@ def _node(mesh: Mesh, probe: int | str | Sequence[float]) -> int:
     return int(probe)
 
 
-def compared_model(models: Mapping[str, Model]) -> str:
-    """Return the name of the model that is compared with the others by default: the first springs, else the first."""
-    springs = [name for name, model in models.items() if model.has_springs]
+def compared_model(models: Mapping[str, Model], model: str | None = None) -> str:
+    """Return the name of the model that is compared with the others: `model`, else the first springs, else the first.
+
+    Raises ProblemError for an unknown name.
+    """
+    if model is not None:
+        return _known(models, model)
+    springs = [name for name, one in models.items() if one.has_springs]
     return (springs or list(models))[0]
+
+
+def reference_names(models: Mapping[str, Model], model: str, references: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the names of the models that `model` is compared with: `references`, by default all others.
+
+    Raises ProblemError for an unknown name, or for that of the model itself.
+    """
+    if references is None:
+        return tuple(name for name in models if name != model)
+    for reference in references:
+        if _known(models, reference) == model:
+            raise ProblemError(
+                f"'{reference}' is the compared model itself: name other models, or leave the list empty"
+            )
+    return tuple(dict.fromkeys(references))
+
+
+def _known(models: Mapping[str, Model], name: str) -> str:
+    if name not in models:
+        raise ProblemError(f"'{name}' is not among the models{nearest(name, models)}: {', '.join(models)}")
+    return name

@@ -79,8 +79,9 @@ def _write_steps(grid: Any, steps: Iterable[Step]) -> None:
         times.append(step.time)
         for (kind, known), arrays in zip(columns.items(), (step.point_arrays, step.cell_arrays), strict=True):
             for name, values in arrays.items():
-                column = known.setdefault(name, _Column(grid, f"{kind}/{name}", values))
-                column.add(values)
+                if name not in known:
+                    known[name] = _Column(grid, f"{kind}/{name}", values)
+                known[name].add(values)
     group.attrs["NSteps"] = np.int64(len(times))
     group["Values"] = np.array(times)
     none = np.zeros(len(times), dtype=np.int64)
@@ -102,15 +103,13 @@ class _Column:
     """
 
     def __init__(self, group: Any, name: str, values: NDArray[Any]) -> None:
-        """Create the dataset for arrays of the form of `values`, or open it."""
+        """Create the dataset for arrays of the form of `values`."""
         self.offsets: list[int] = []
         self._last: NDArray[Any] | None = None
-        if name not in group:
-            rest = values.shape[1:]
-            chunk = (max(1, min(len(values), _CHUNK)), *rest)
-            form = {"maxshape": (None, *rest), "chunks": chunk, "compression": _LEVEL, "shuffle": True}
-            group.create_dataset(name, (0, *rest), values.dtype, **form)
-        self._rows = group[name]
+        rest = values.shape[1:]
+        chunk = (max(1, min(len(values), _CHUNK)), *rest)
+        form = {"maxshape": (None, *rest), "chunks": chunk, "compression": _LEVEL, "shuffle": True}
+        self._rows = group.create_dataset(name, (0, *rest), values.dtype, **form)
 
     def add(self, values: NDArray[Any]) -> None:
         """Add an array, unless it equals the last one."""

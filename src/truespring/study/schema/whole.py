@@ -8,13 +8,13 @@ from pydantic import Field, field_validator
 
 from truespring.dynamics import Damping, Dynamics
 from truespring.equilibrium import check_solver
-from truespring.errors import StudyError, nearest
+from truespring.errors import StudyError
 from truespring.mesh import Mesh, named_point, nearest_node, select
 from truespring.models import Model
 from truespring.problem import Problem
 from truespring.report.series import Form
 from truespring.solvers import ArcLength, DisplacementControl, Newton, Solver
-from truespring.study.case import compared_model
+from truespring.study.case import compared_model, reference_names
 from truespring.study.places import Places
 from truespring.study.schema.body import AnyLoad, MaterialKeys, RegionKeys, SectionKeys, SupportKeys
 from truespring.study.schema.meshes import AnyMesh
@@ -188,23 +188,10 @@ class CompareKeys(Keys):
 
     def names(self, places: Places, models: Mapping[str, Model]) -> tuple[str, tuple[str, ...]]:
         """Return the name of the compared model, by default the first springs, and those of its references."""
-        compared = self.model or compared_model(models)
-        self._check_known(places, "model", compared, models)
-        if self.references is None:
-            return compared, tuple(name for name in models if name != compared)
-        for reference in self.references:
-            self._check_known(places, "references", reference, models)
-            if reference == compared:
-                with places.at("compare", "references"):
-                    raise StudyError(
-                        f"'{reference}' is the compared model itself: name other models, or leave the list empty"
-                    )
-        return compared, tuple(dict.fromkeys(self.references))
-
-    def _check_known(self, places: Places, key: str, name: str, models: Mapping[str, Model]) -> None:
-        if name not in models:
-            with places.at("compare", key):
-                raise StudyError(f"'{name}' is not among the models{nearest(name, models)}: {', '.join(models)}")
+        with places.at("compare", "model"):
+            compared = compared_model(models, self.model)
+        with places.at("compare", "references"):
+            return compared, reference_names(models, compared, self.references)
 
 
 class OutputKeys(Keys):
