@@ -2,6 +2,7 @@
 
 import sys
 import tomllib
+from importlib.util import find_spec
 from pathlib import Path
 
 DOCS = Path(__file__).parent
@@ -84,7 +85,11 @@ sphinx_gallery_conf = {
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"truespring {release}"
-html_static_path = ["_static"]
+# MathJax beside the pages: formulas need no network. The extension of this package is not safe in parallel builds.
+_mathjax = find_spec("sphinx-mathjax-offline")
+assert _mathjax is not None and _mathjax.origin is not None
+html_static_path = ["_static", str(Path(_mathjax.origin).parent / "static")]
+mathjax_path = "mathjax/tex-chtml.js"
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = True
