@@ -421,9 +421,12 @@ def test_a_page_cuts_a_small_body_at_once_and_a_large_one_aside(large: int, monk
         loop = Loop(live)
         body = loop.latest.drawn.number
         start, end, depth = across(0.025)
+        built: list[bool] = []
+        cut = live.cut
+        monkeypatch.setattr(live, "cut", lambda *place, aside: (built.append(aside), cut(*place, aside=aside)))
         loop.ask(Order("cut", place=(*start, *end, *depth)))
         loop.turn()
-        assert live.is_cutting == (large == 0)
+        assert built == [large == 0]
         while live.is_cutting:
             loop.turn()
         assert live.elements_left.tolist() == [0, 1, 3, 4]

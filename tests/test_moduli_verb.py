@@ -16,7 +16,7 @@ from truespring.cli import main
 from truespring.models.bending import bending_excess
 from truespring.models.findings import CODES, findings
 from truespring.models.fitness import Fitness, follows_poisson, judge, recommended
-from truespring.report.page import _moduli_rows
+from truespring.report.page import moduli_rows
 from truespring.report.style import figure_style
 from truespring.report.verdict import moduli_sentence
 from truespring.report.young import Known, _facets, _visible, young_figure
@@ -339,12 +339,12 @@ def test_findings_are_in_order_and_have_a_code() -> None:
 
 def test_the_rows_of_the_report() -> None:
     six = ts.moduli(SIX, ts.Springs("lloyd"))
-    rows = {what: found for what, found, _ in _moduli_rows(six)}
+    rows = {what: found for what, found, _ in moduli_rows(six)}
     assert rows["Young’s modulus largest of all directions"] == "2.86 Pa"
     assert rows["largest over smallest Young’s modulus"] == f"{six.anisotropy:.3f}"
     squares = ts.moduli(SQUARES, ts.Springs("lloyd"))
-    assert [what for what, _, _ in _moduli_rows(squares)][-1] == "Zener ratio (1 is isotropic)"
-    assert len(_moduli_rows(squares)) == 5
+    assert [what for what, _, _ in moduli_rows(squares)][-1] == "Zener ratio (1 is isotropic)"
+    assert len(moduli_rows(squares)) == 5
 
 
 def test_the_surface_in_space_is_youngs_modulus() -> None:

@@ -197,7 +197,7 @@ class _Cursor:
         raw = self._data[self._next : self._next + size]
         self._next += size
         if code == _BIT:
-            return np.unpackbits(np.frombuffer(raw, np.uint8), count=count).astype(bool)
+            return np.unpackbits(np.frombuffer(raw, np.uint8), count=count)
         return np.frombuffer(raw, dtype).astype(dtype.newbyteorder("="))
 
     def _headed_array(self, name: str, count: int) -> Ints:

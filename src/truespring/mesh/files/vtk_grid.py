@@ -195,7 +195,7 @@ def cell_groups(cells: Sequence[Cells], arrays: Arrays) -> dict[str, Ints]:
         dims[block.numbers] = block.dim
     groups = {}
     for name, values in _choices(arrays):
-        if values.dtype.kind == "b":  # arrays of PyVista; no file has them
+        if values.dtype.kind == "b":  # arrays of PyVista; bits of files are numbers
             groups[name] = np.flatnonzero(values)
             continue
         distinct = np.unique(values)
