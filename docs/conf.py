@@ -1,5 +1,6 @@
 """Sphinx builds the site from this folder: `make docs` all of it, `make docs-quick` without notebooks and gallery."""
 
+import logging
 import sys
 import tomllib
 from importlib.util import find_spec
@@ -62,6 +63,8 @@ default_role = "code"
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 88
 
+# Films are written by Pillow where ffmpeg is not installed.
+logging.getLogger("matplotlib.animation").setLevel(logging.ERROR)
 sphinx_gallery_conf = {
     "examples_dirs": str(ROOT / "examples" / "gallery"),
     "gallery_dirs": "gallery",
