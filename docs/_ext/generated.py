@@ -27,10 +27,29 @@ def _read(app: Any, name: str, source: list[str]) -> None:
         source[0] = _BLOCK.sub(lambda block: PARTS[block[1]](), source[0])
 
 
+def _one_name_each(lines: list[str]) -> list[str]:
+    """Return the lines with an entry for each name of `first, second: text`, which napoleon takes for name and type."""
+    found: list[str] = []
+    number = 0
+    while number < len(lines):
+        entry = re.match(r"^(\s+)(\w+(?:, \w+)+)(: .*)$", lines[number])
+        last = number + 1
+        if entry:
+            while last < len(lines) and lines[last].startswith(entry[1] + " "):
+                last += 1
+            for name in entry[2].split(", "):
+                found += [entry[1] + name + entry[3], *lines[number + 1 : last]]
+        else:
+            found.append(lines[number])
+        number = last
+    return found
+
+
 def _docstring(app: Any, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
     """Keep formulas: outside code, a star, a bar or a final underscore is itself."""
     if what in ("attribute", "property", "data"):
         lines.insert(0, "")  # else napoleon reads what is before a colon of the first line as a type
+    lines[:] = _one_name_each(lines)
     code = False
     for number, line in enumerate(lines):
         # Examples and literal blocks are code already.
