@@ -202,6 +202,12 @@ def test_what_cannot_be_drawn_is_an_error(springs: ts.Solution, block: ts.Soluti
         springs.plot(color="distance")
     with pytest.raises(OutputError, match=r"over = 'stress': a Solution is expected; a quantity is given as color="):
         springs.plot("stress")  # type: ignore[arg-type]
+    with pytest.raises(OutputError, match=r"over = 'stress': a Solution is expected"):
+        springs.animate("never.gif", "stress")  # type: ignore[arg-type]
+    with pytest.raises(OutputError, match="cannot be written: "):
+        springs.animate(Path(__file__) / "x.gif")
+    with pytest.raises(OutputError, match="magnify = '10': a factor above 0 is expected"):
+        springs.plot(magnify="10")  # type: ignore[arg-type]
     with pytest.raises(OutputError, match=r"ax has three axes: .* leave projection out"):
         block.plot(ax=Figure().add_subplot(projection="3d"))
     with pytest.raises(OutputError, match=r"has 2 dimensions, .* 3: they cannot be drawn in one picture"):

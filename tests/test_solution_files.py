@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import truespring as ts
-from truespring.errors import OutputError
+from truespring.errors import MeshError, OutputError
 from truespring.report.series import write_series
 
 
@@ -74,6 +74,10 @@ def test_other_suffixes_and_bodies_are_errors(strip: ts.Solution, tmp_path: Path
     with pytest.raises(OutputError, match=r"x\.vtk: the suffix is \.pvd, \.vtkhdf, \.vtu, .*did you mean '\.vtu'"):
         strip.write(tmp_path / "x.vtk")
     assert not list(tmp_path.iterdir())
+    (tmp_path / "taken.csv").mkdir()
+    for file in (tmp_path / "taken.csv", Path(__file__) / "x.vtu"):
+        with pytest.raises(OutputError, match="cannot be written: "):
+            strip.write(file)
     surface = ts.read_stl(strip.problem, strip.write(tmp_path / "strip.stl"))
     with pytest.raises(OutputError, match=r"strip\.stl is a surface without displacements: write \.stl or \.vtu"):
         surface.write(tmp_path / "x.csv")
@@ -90,6 +94,8 @@ def test_the_table_has_closed_forms(strip: ts.Solution, monkeypatch: pytest.Monk
     assert table["fy"].to_numpy() == pytest.approx([0.0, -0.005, -0.01]) and set(table["state"]) == {"stable"}
     tip, near = strip.table("right-middle"), strip.table((0.039, 0.0051))
     assert (tip == near).all(axis=None) and tip["uy"].iloc[-1] < -0.001
+    with pytest.raises(MeshError, match=r"point \(nan, 0\): 2 coordinates are expected"):
+        strip.table(probe=(float("nan"), 0))
     with pytest.raises(OutputError, match=r"probe = 27: nodes are 0 to 26; or a point such as 'right-middle'"):
         strip.table(27)
     moved = strip.table()  # of the node that moves most

@@ -99,6 +99,15 @@ def writing(out: Path) -> Iterator[None]:
         raise OutputError(f"out = {out}: {place} cannot be written: {error.strerror}") from None
 
 
+@contextmanager
+def writing_file(file: Path) -> Iterator[None]:
+    """Convert an OSError to an OutputError that names the file."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{error.filename or file} cannot be written: {error.strerror or error}") from None
+
+
 class Lock:
     """Create and lock a folder until `release` or the end of the process.
 

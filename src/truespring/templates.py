@@ -70,7 +70,7 @@ def _files(kind: str, study: Path) -> Mapping[Path, bytes]:
 
 def _text(kind: str) -> str:
     studies = _studies()
-    if kind not in studies:
+    if not isinstance(kind, str) or kind not in studies:
         raise TruespringError(
             f"kind = {shown(kind)} is unknown{nearest(str(kind), studies)}; allowed: {', '.join(studies)}"
         )

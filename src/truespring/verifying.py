@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from truespring.errors import StudyError
+from truespring.errors import ProblemError, StudyError, shown
 from truespring.models import Model
 from truespring.outputs import writing
 from truespring.potential import Potential
@@ -101,6 +101,8 @@ def verify(
         "refine": refine,
         "title": title,
     }
+    if timeout is not None and not (isinstance(timeout, int | float) and timeout > 0):
+        raise ProblemError(f"timeout = {shown(timeout)}: a time above 0 s is expected, such as 60")
     case = _case(study, models, {key: value for key, value in options.items() if value is not None})
     folder = None if out is None else Path(out)
     ((result, _),) = verify_each([case], folder, lambda: chosen(progress, bars), timeout=timeout, animate=animate)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truespring.arrays import Floats, Ints
-from truespring.errors import MeshError, nearest
+from truespring.errors import MeshError, nearest, shown
 from truespring.mesh.facets import facet_keys
 from truespring.mesh.measures import corner_measures, element_corner_measures
 from truespring.mesh.mesh import Mesh
@@ -170,9 +170,13 @@ def nearest_node(mesh: Mesh, point: Sequence[float]) -> int:
         >>> mesh.nodes[ts.nearest_node(mesh, (0.052, 0.0))].tolist()
         [0.05, 0.0]
     """
-    if len(point) != mesh.dim:
-        raise MeshError(f"point {list(point)}: {mesh.dim} coordinates are expected")
-    distance = np.linalg.norm(mesh.nodes - np.array(point), axis=1)
+    try:
+        place = np.array(point, dtype=float)
+    except (TypeError, ValueError):
+        place = np.zeros(0)
+    if place.shape != (mesh.dim,) or not np.isfinite(place).all():
+        raise MeshError(f"point {shown(point)}: {mesh.dim} coordinates are expected")
+    distance = np.linalg.norm(mesh.nodes - place, axis=1)
     ties = np.flatnonzero(distance <= distance.min() + 1e-9 * mesh.diameter)
     return int(min(ties, key=lambda node: tuple(mesh.nodes[node])))
 

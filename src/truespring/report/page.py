@@ -109,7 +109,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "parts": part_rows(result),
         "histories": [
             "curves",
-            *(name for name in pictures if name.startswith("reactions")),
+            *_reactions(pictures),
             "tools",
             *map(energies_name, result.paths),
             "error",

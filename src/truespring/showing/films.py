@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truespring.arrays import Floats
 from truespring.errors import OutputError, one_line
+from truespring.outputs import writing_file
 from truespring.report.animation import FRAMES, common_colors, frames_of, whole_reel, write_gif, write_mp4
 from truespring.showing.frames import figure_size
 from truespring.showing.paints import Paint
@@ -33,13 +34,15 @@ def animate(solution: Solution, file: Path, over: Solution | None, color: str | 
     if suffix == ".mp4" and importlib.util.find_spec("imageio_ffmpeg") is None:
         raise OutputError(f"{file}: MP4 needs imageio-ffmpeg: pip install 'truespring[video]', or write a .gif")
     pair = Pair(solution, over)
+    states_of_both(pair)  # an error if they cannot be drawn together
     frames, colors = _frames(pair) if color is None else _colored_frames(pair, color)
     if len(frames) < 2:
         raise OutputError(f"{file}: an animation needs two load levels or more, {solution.label} has fewer")
-    file.parent.mkdir(parents=True, exist_ok=True)
-    if suffix == ".gif":
-        write_gif(frames, file, colors)
-        return file
+    with writing_file(file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        if suffix == ".gif":
+            write_gif(frames, file, colors)
+            return file
     try:
         write_mp4(frames, file)
     except (OSError, RuntimeError) as error:  # its program ffmpeg is missing, or failed

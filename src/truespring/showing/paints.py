@@ -64,7 +64,7 @@ def paint_of(color: str, pair: Pair, state: State) -> Paint:
 
     Raises OutputError if the name is unknown or the solution does not have the quantity.
     """
-    if color not in COLORS:
+    if not isinstance(color, str) or color not in COLORS:
         allowed = ", ".join(COLORS)
         raise OutputError(f"color = {shown(color)} is unknown{nearest(str(color), COLORS)}; allowed: {allowed}")
     paint = COLORS[color](pair, state)

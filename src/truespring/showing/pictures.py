@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truespring.errors import OutputError
+from truespring.errors import OutputError, shown
 from truespring.report.axis import axis_of
 from truespring.report.bodies import magnification, over_title
 from truespring.report.quantity import times
@@ -122,6 +122,6 @@ def _factor(pair: Pair, magnify: float | None) -> float:
         return 1.0
     if magnify is None:
         return magnification(pair.result)
-    if not (np.isfinite(magnify) and magnify > 0):
-        raise OutputError(f"magnify = {magnify!r}: a factor above 0 is expected, such as 10")
+    if not isinstance(magnify, int | float | np.number) or not (np.isfinite(magnify) and magnify > 0):
+        raise OutputError(f"magnify = {shown(magnify)}: a factor above 0 is expected, such as 10")
     return float(magnify)

@@ -10,6 +10,8 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from html import escape
 from typing import Any, Protocol, Self, TypeVar
 
+from truespring.errors import OutputError
+
 Callback = TypeVar("Callback", bound=Callable[..., None])
 
 # Shortest interval between updates in a notebook [s].
@@ -58,6 +60,8 @@ def chosen(
     """Return the context of the argument `progress` of a verb: True shows a bar, a callback is called instead."""
     if isinstance(progress, bool):
         return shown() if progress else nullcontext()
+    if progress is not None and not callable(progress):
+        raise OutputError(f"progress = {progress!r}: True, False or a function is expected")
     return nullcontext(progress)
 
 

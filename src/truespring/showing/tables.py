@@ -35,7 +35,7 @@ def _watched(solution: Solution, probe: Probe) -> int:
     if isinstance(probe, str):
         return named_point(mesh, probe)
     if not isinstance(probe, int | np.integer):
-        return nearest_node(mesh, list(probe))
+        return nearest_node(mesh, probe)
     if not 0 <= probe < mesh.n_nodes:
         raise OutputError(f"probe = {probe}: nodes are 0 to {mesh.n_nodes - 1}; or a point such as 'right-middle'")
     return int(probe)

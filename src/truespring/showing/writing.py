@@ -6,6 +6,7 @@ from pathlib import Path
 
 from truespring.errors import OutputError, nearest
 from truespring.mesh.selections import AXES
+from truespring.outputs import writing_file
 from truespring.report.series import snapshot_of, write_series, write_stl, write_vtkhdf_series
 from truespring.showing.levels import state_of
 from truespring.solution import Solution, State
@@ -17,8 +18,9 @@ def write_solution(solution: Solution, file: Path, level: int) -> Path:
     if suffix not in _WRITERS:
         raise OutputError(f"{file}: the suffix is {', '.join(_WRITERS)}, not '{suffix}'{nearest(suffix, _WRITERS)}")
     state = state_of(solution, level) if solution.states else None
-    file.parent.mkdir(parents=True, exist_ok=True)
-    _WRITERS[suffix](solution, file, state)
+    with writing_file(file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        _WRITERS[suffix](solution, file, state)
     return file
 
 

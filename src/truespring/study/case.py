@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from truespring.comparison import TOLERANCE
-from truespring.errors import MeshError, ProblemError, nearest
+from truespring.errors import MeshError, ProblemError, nearest, shown
 from truespring.mesh import Mesh, named_point, nearest_node
 from truespring.models import Model, as_model, check_fibres
 from truespring.potential import Potential
@@ -78,12 +78,12 @@ def case_of(
     not between 0 and 1, ModelError if a model has the wrong type or does not fit the problem, MeshError if the probe
     does not exist.
     """
-    if not models:
+    if not models or not isinstance(models, Mapping):
         raise ProblemError("verify needs models: models={'springs': Springs(rule='gaussian'), 'fem': Fem(...)}")
-    if not 0 < tolerance < 1:
-        raise ProblemError(f"tolerance = {tolerance} is not between 0 and 1")
+    if not isinstance(tolerance, int | float) or not 0 < tolerance < 1:
+        raise ProblemError(f"tolerance = {shown(tolerance)} is not between 0 and 1")
     for name in models:
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
+        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
             raise ProblemError(f"models: '{name}' is not a name: use letters, digits, - and _, such as 'springs'")
     entries = {name: as_model(model) for name, model in models.items()}
     for entry in entries.values():
@@ -107,7 +107,7 @@ def _node(mesh: Mesh, probe: int | str | Sequence[float]) -> int:
     if isinstance(probe, str):
         return named_point(mesh, probe)
     if not isinstance(probe, int | np.integer):
-        return nearest_node(mesh, list(probe))
+        return nearest_node(mesh, probe)
     if not 0 <= probe < mesh.n_nodes:
         raise MeshError(f"probe = {probe}: the mesh has {mesh.n_nodes} nodes, counted from 0")
     return int(probe)
@@ -131,6 +131,8 @@ def reference_names(models: Mapping[str, Model], model: str, references: Sequenc
     """
     if references is None:
         return tuple(name for name in models if name != model)
+    if isinstance(references, str):
+        raise ProblemError(f"references = '{references}': a list of names is expected, such as ['{references}']")
     for reference in references:
         if _known(models, reference) == model:
             raise ProblemError(
