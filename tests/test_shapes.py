@@ -308,6 +308,7 @@ def test_sides_of_a_box() -> None:
     for wrong, said in (
         (ts.Plane("z", 0.4), "nearest nodes are at z = 0 m"),
         (ts.Plane("w", 0.0), "allowed: x, y, z"),
+        (ts.Plane(2, 0.0), "axis 2 is unknown; allowed: x, y, z"),  # type: ignore[arg-type]
         (ts.Box((0.0, 0.0), (1.0, 1.0)), "corners of 3 coordinates"),
         (ts.Box((0.1, 0.1, 0.1), (0.2, 0.2, 0.2)), "no node in the box"),
         (ts.Near((0.0, 0.0)), "3 coordinates"),
@@ -324,7 +325,7 @@ def test_groups_come_before_sides() -> None:
     assert select(mesh, "tip").tolist() == [5, 8, 11]
     assert select(mesh, "right").tolist() == select(plain, "right").tolist()
     assert ts.named_point(mesh, "tip") in (5, 8, 11)
-    with pytest.raises(MeshError, match=r"'tipp' is no side or point.*'tip'"):
+    with pytest.raises(MeshError, match=r"'tipp' is no side or point.*'tip'.*: left, tip, right, bottom, top, back"):
         select(mesh, "tipp")
 
 
@@ -455,6 +456,23 @@ def test_groups_are_numbers() -> None:
     for wrong in ([0.7], [True, False]):
         with pytest.raises(MeshError, match="must be a list of element numbers"):
             ts.Mesh(plain.nodes, plain.elements, element_groups={"a": np.array(wrong)})
+    with pytest.raises(MeshError, match=r"node numbers, such as np\.flatnonzero\(mask\)$"):
+        ts.Mesh(plain.nodes, plain.elements, node_groups={"a": plain.nodes[:, 0] > 1.0})
+
+
+@pytest.mark.parametrize(
+    ("mesh", "there"),
+    [
+        (ts.box((1.0, 1.0, 1.0), (1, 1, 1)), "quadrilateral'; use element = 'hexahedron'$"),
+        (ts.box((1.0, 1.0, 1.0), (1, 1, 1), "tetrahedron"), "has 2 dimensions, .* 3; use element = 'tetrahedron'$"),
+        (ts.rectangle((1.0, 1.0), (1, 1), "triangle"), "quadrilateral'; use element = 'triangle'$"),
+    ],
+)
+def test_arrays_of_another_kind_of_element_name_the_kinds_that_fit(mesh: ts.Mesh, there: str) -> None:
+    with pytest.raises(MeshError, match=there):
+        ts.Mesh(mesh.nodes, mesh.elements)
+    with pytest.raises(MeshError, match=r"\(1, 7\), expected \(n, 4\) for element = 'quadrilateral'$"):
+        ts.Mesh(mesh.nodes, np.zeros((1, 7), dtype=int))
 
 
 def test_a_mapped_mesh_keeps_elements_groups_and_the_names_of_its_sides() -> None:
@@ -474,7 +492,7 @@ def test_a_mapped_mesh_keeps_elements_groups_and_the_names_of_its_sides() -> Non
 
 def test_functions_that_do_not_map_a_mesh_are_errors() -> None:
     flat = ts.rectangle((1.0, 1.0), (2, 2))
-    with pytest.raises(MeshError, match="inverted"):
+    with pytest.raises(MeshError, match=r"4 of 4 elements are inverted.*exchange two coordinates of its map"):
         ts.mapped(flat, lambda x, y: (y, x))
     with pytest.raises(MeshError, match=r"shapes \[\(9,\)\]: it must return 2 coordinates, each of shape \(9,\)"):
         ts.mapped(flat, lambda x, y: (x,))

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from truespring.arrays import Bools, Floats, Ints, frozen_floats, frozen_ints
-from truespring.errors import MeshError, nearest
+from truespring.errors import MeshError, nearest, shown
 from truespring.mesh.cells import CELL_SHAPES
 from truespring.mesh.corners import Corners, corners_in_slices, determinants, squared_distance
 from truespring.mesh.facets import facet_columns, facet_keys, facet_nodes, halved, n_facets
@@ -87,9 +87,14 @@ class Mesh:
         try:
             object.__setattr__(self, "nodes", frozen_floats(self.nodes, (None, None), "nodes"))
             corners = width(self.dim) if self.element == MIXED else self.kind.n_nodes
-            object.__setattr__(self, "elements", frozen_ints(self.elements, (None, corners), "elements"))
+            object.__setattr__(self, "elements", frozen_ints(self.elements, (None, None), "elements"))
         except ValueError as error:
             raise MeshError(str(error)) from None
+        if self.elements.shape[1] != corners:
+            raise MeshError(
+                f"elements has shape {self.elements.shape}, expected (n, {corners}) for element = '{self.element}'"
+                f"{_other_kinds(self.elements.shape[1], self.dim)}"
+            )
         object.__setattr__(self, "element_groups", _groups(self.element_groups, len(self.elements), "element"))
         object.__setattr__(self, "element_vectors", self._element_vectors())
         object.__setattr__(self, "facet_groups", self._facet_groups())
@@ -222,7 +227,10 @@ class Mesh:
         if not len(self.nodes) or not len(self.elements):
             raise MeshError(f"a mesh of {len(self.nodes)} nodes and {len(self.elements)} elements is empty")
         if self.element not in ("line", MIXED) and self.dim != self.kind.dim:
-            raise MeshError(f"a {self.element} has {self.kind.dim} dimensions, the nodes have {self.dim}")
+            raise MeshError(
+                f"a {self.element} has {self.kind.dim} dimensions, the nodes have {self.dim}"
+                f"{_other_kinds(self.elements.shape[1], self.dim)}"
+            )
         if self.elements.min() < 0 or self.elements.max() >= len(self.nodes):
             raise MeshError(
                 f"elements name nodes {self.elements.min()} to {self.elements.max()}, "
@@ -232,9 +240,11 @@ class Mesh:
         used[self.elements] = True
         self._refuse(~used, "nodes", "unreferenced: no element has them", lambda: self.nodes)
         smallest, least = self._rest_jacobians.min(axis=1), self._degenerate
-        self._refuse(
-            smallest <= -least, "elements", "inverted: their corner Jacobian is negative", lambda: self.centres
-        )
+        inverted = smallest <= -least
+        why = "inverted: their corner Jacobian is negative"
+        if inverted.all():
+            why += " (of a mirrored mesh, exchange two coordinates of its map, or reverse the node order)"
+        self._refuse(inverted, "elements", why, lambda: self.centres)
         self._refuse(~(smallest > least), "elements", "degenerate: flat or with coincident nodes", lambda: self.centres)
         if self.element != "line":  # springs may be parallel
             twice = np.ones(len(self.elements), dtype=bool)
@@ -582,13 +592,20 @@ def _frozen(array: Floats) -> Floats:
     return array
 
 
+def _other_kinds(n_nodes: int, dim: int) -> str:
+    """Return the kinds of so many nodes and dimensions as the end of a message, empty if there are none."""
+    names = [name for name, kind in ELEMENT_KINDS.items() if (kind.n_nodes, kind.dim) == (n_nodes, dim)]
+    return "".join(f"; use element = '{name}'" for name in names)
+
+
 def _groups(groups: Mapping[str, Ints], n_there: int, what: str) -> Mapping[str, Ints]:
     """Freeze groups: numbers ascending and each once; raise MeshError for one that is empty or does not exist."""
     frozen = {}
     for name, numbers in groups.items():
         given = np.asarray(numbers)
         if given.ndim != 1 or not np.issubdtype(given.dtype, np.integer):
-            raise MeshError(f"{what} group '{name}' = {numbers!r}: must be a list of {what} numbers")
+            instead = ", such as np.flatnonzero(mask)" if given.dtype == bool else ""
+            raise MeshError(f"{what} group '{name}' = {shown(numbers)}: must be a list of {what} numbers{instead}")
         members = np.unique(given.astype(np.int64))
         if not members.size or members[0] < 0 or members[-1] >= n_there:
             raise MeshError(f"{what} group '{name}' is empty or has a number that no {what} has: 0 to {n_there - 1}")

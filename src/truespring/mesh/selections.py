@@ -120,8 +120,8 @@ def _side(mesh: Mesh, name: str) -> Ints:
 
 
 def _plane(mesh: Mesh, axis: str, value: float) -> Ints:
-    if axis not in AXES[: mesh.dim]:
-        raise MeshError(f"axis '{axis}' is unknown; allowed: {', '.join(AXES[: mesh.dim])}")
+    if axis not in tuple(AXES[: mesh.dim]):
+        raise MeshError(f"axis {shown(axis)} is unknown; allowed: {', '.join(AXES[: mesh.dim])}")
     coordinates = mesh.nodes[:, AXES.index(axis)]
     distance = np.abs(coordinates - value)
     found = np.flatnonzero(distance <= _TOLERANCE * mesh.diameter)
@@ -197,7 +197,8 @@ def named_point(mesh: Mesh, name: str) -> int:
         centre = mesh.nodes[group].mean(axis=0)
         return int(group[np.linalg.norm(mesh.nodes[group] - centre, axis=1).argmin()])
     words = name.split("-")
-    allowed = [*mesh.node_groups, *(side for side, (axis, _) in SIDES.items() if axis < mesh.dim)]
+    sides = (side for side, (axis, _) in SIDES.items() if axis < mesh.dim)
+    allowed = list(dict.fromkeys([*mesh.node_groups, *sides]))
     point = (mesh.lower + mesh.upper) / 2
     taken: set[int] = set()
     for word in words:
