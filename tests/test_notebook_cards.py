@@ -81,6 +81,15 @@ def test_each_value_has_a_table_and_a_picture(result: Any) -> None:
     assert not pyplot.get_fignums()
 
 
+def test_a_card_of_a_solution_has_the_length_of_its_largest_displacement(result: Any) -> None:
+    """Not its largest component: every node moves by (3, 4) mm."""
+    springs = result.solutions["springs"]
+    last = springs.states[-1]
+    moved = replace(last, displacement=np.tile([3e-3, 4e-3], (len(last.displacement), 1)))
+    texts = Read(replace(springs, states=(*springs.states[:-1], moved))._repr_html_()).texts
+    assert texts[texts.index("largest displacement") + 1] == "5.00 mm"
+
+
 def test_a_title_of_the_user_is_a_text(result: Any) -> None:
     assert "Result: <b>a & b</b>" in Read(result._repr_html_()).texts
 

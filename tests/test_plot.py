@@ -245,6 +245,10 @@ def test_an_animation_has_a_frame_for_each_level(springs: ts.Solution, finite: t
     surface = ts.read_stl(springs.problem, springs.write(tmp_path / "springs.stl"))
     with pytest.raises(OutputError, match=r"needs two load levels or more, springs.stl has fewer"):
         surface.animate(tmp_path / "surface.gif")
+    with pytest.raises(OutputError, match=r"needs two load levels or more, springs.stl has fewer"):
+        surface.animate(tmp_path / "surface.gif", color="displacement")
+    with pytest.raises(OutputError, match=r"magnify = '10': springs.stl is a surface"):
+        springs.plot(over=surface, magnify="10")  # type: ignore[arg-type]
 
 
 def test_a_mesh_shows_its_sides_and_groups(axes: Any) -> None:
@@ -278,6 +282,22 @@ def test_a_problem_shows_loads_and_springs(size: tuple[float, ...]) -> None:
 
     plain, sprung = (problem.plot(model, ax=Figure().subplots()) for model in (None, ts.Springs("gaussian")))
     assert count(plain, load) > 200 and count(plain, blue) == 0 and count(sprung, blue) > 200
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_network_shows_its_lines_without_a_model(dim: int) -> None:
+    """As elements, in their colour; its springs, which are at the same places, hide them."""
+    nodes = np.array([(0.0, 0.0, 0.0), (1.0, 0.5, 0.0), (2.0, 0.0, 0.2)])[:, :dim]
+    truss = ts.SpringNetwork(nodes, np.array([(0, 1), (1, 2), (0, 2)]), stiffness=np.ones(3))
+    held = [ts.Fixed([0, 2]), ts.Fixed([1], fix=["x", "y", "z"][1:dim])]
+    problem = ts.Problem(truss.mesh, supports=held, loads=[ts.Force([1], (0.1, 0.0, 0.0)[:dim])])
+
+    def count(model: Any, color: Any) -> int:
+        pixels = artist(problem.plot(model, ax=Figure().subplots()), "image").get_array()[..., :3].astype(int)
+        return int((np.abs(pixels - color).max(axis=-1) < 24).sum())
+
+    ink, blue = [0x16, 0x19, 0x1D], [0x00, 0x72, 0xB2]
+    assert count(None, ink) > count(truss, ink) + 500 and count(None, blue) == 0 and count(truss, blue) > 500
 
 
 def test_curves_have_each_line_once() -> None:

@@ -96,7 +96,7 @@ def test_the_table_has_closed_forms(strip: ts.Solution, monkeypatch: pytest.Monk
     assert (tip == near).all(axis=None) and tip["uy"].iloc[-1] < -0.001
     with pytest.raises(MeshError, match=r"point \(nan, 0\): 2 coordinates are expected"):
         strip.table(probe=(float("nan"), 0))
-    with pytest.raises(OutputError, match=r"probe = 27: nodes are 0 to 26; or a point such as 'right-middle'"):
+    with pytest.raises(MeshError, match=r"probe = 27: nodes are 0 to 26; or a point such as 'right-middle'"):
         strip.table(27)
     moved = strip.table()  # of the node that moves most
     largest = np.linalg.norm(strip.states[-1].displacement, axis=1).max()

@@ -363,7 +363,8 @@ class Solution:
             probe: number of a node, a point such as "right-middle", or a position [m], whose nearest node is taken; by
                 default the node that moves most.
 
-        Raises OutputError if neither library is installed, the solution has no states, or there is no such node.
+        Raises OutputError if neither library is installed or the solution has no states, MeshError if there is no such
+        node.
 
         Example:
             >>> table = solution.table(probe="right-middle")

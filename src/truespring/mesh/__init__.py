@@ -36,6 +36,7 @@ from truespring.mesh.selections import loaded as loaded
 from truespring.mesh.selections import named_point as named_point
 from truespring.mesh.selections import nearest_node as nearest_node
 from truespring.mesh.selections import outer_facets as outer_facets
+from truespring.mesh.selections import probe_node as probe_node
 from truespring.mesh.selections import select as select
 from truespring.mesh.selections import select_elements as select_elements
 from truespring.mesh.selections import shares as shares

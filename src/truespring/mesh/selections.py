@@ -181,6 +181,20 @@ def nearest_node(mesh: Mesh, point: Sequence[float]) -> int:
     return int(min(ties, key=lambda node: tuple(mesh.nodes[node])))
 
 
+def probe_node(mesh: Mesh, probe: int | str | Sequence[float]) -> int:
+    """Return the number of a node given by its number, by a named point or by a position [m], see `nearest_node`.
+
+    Raises MeshError if there is no such node.
+    """
+    if isinstance(probe, str):
+        return named_point(mesh, probe)
+    if not isinstance(probe, int | np.integer):
+        return nearest_node(mesh, probe)
+    if not 0 <= probe < mesh.n_nodes:
+        raise MeshError(f"probe = {probe}: nodes are 0 to {mesh.n_nodes - 1}; or a point such as 'right-middle'")
+    return int(probe)
+
+
 def named_point(mesh: Mesh, name: str) -> int:
     """Return the node nearest to a point named by joined sides, such as "right-middle", "left-top" or "middle".
 

@@ -83,7 +83,7 @@ def _body_figure(
     scale = natural_scale(float(np.abs([lower, upper]).max()), "m")
     extent = np.maximum(upper - lower, 1e-3 * float((upper - lower).max()))
     columns, words = legend_columns(legend, 4.7)
-    rows = len(columns[0])
+    rows = max(map(len, columns), default=0)
     words = max(words, text_width(title, 9, bold=True), text_width(remark, 8))
     words = max(words, text_width(bar.label, 8)) if bar else words
     left, right, bottom, top = 0.72, 0.12, 0.48, 0.44 + ROW * rows + ROW * bool(remark) + BAR * bool(bar)
@@ -244,9 +244,9 @@ def undeformed_figure(body: Undeformed) -> Sheet:
     ends = np.array([end for arrow in arrows for end in (*arrow.ends, arrow.room)] + [mesh.lower, mesh.upper])
     ends = np.concatenate([ends, near(tools, mesh.lower, mesh.upper)])
     lower, upper = ends.min(axis=0) - 0.06 * size, ends.max(axis=0) + 0.06 * size
-    legend = (*body.legend(mesh.element != "line"), *entries(problem))
+    legend = (*body.legend, *entries(problem))
     area, scale = _body_figure(body.title, lower, upper, legend)
-    if mesh.element != "line":
+    if body.has_elements:
         _lines(area, mesh.nodes / scale.size, mesh.edges, INK, 1.3, 2, "elements")
     if springs is not None:
         _lines(area, mesh.nodes / scale.size, springs, BLUE, 0.6, 3, "springs")

@@ -53,7 +53,7 @@ def undeformed_picture(body: Undeformed) -> Picture:
         layers.append(solid(points, facets, _tinted(problem, facets, arrows), edges_of(facets), INK, 1.0))
     if springs is not None:
         layers.append(wires(points, facets, springs, 0.6))
-    elif not len(facets):
+    elif body.has_elements and not len(facets):
         layers.append(wires(points, facets, mesh.edges, 0.6, INK))
     tools = drawn_tools(problem, None)
     corners = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
@@ -75,7 +75,7 @@ def undeformed_picture(body: Undeformed) -> Picture:
             draw_dot(area, points[body.probe, :2] / scale.size)
 
     lower, upper = taken.min(axis=0) - 0.03 * size, taken.max(axis=0) + 0.03 * size
-    legend = (*body.legend(len(facets) > 0), *entries(problem))
+    legend = (*body.legend, *entries(problem))
     return Picture(body.title, "", legend, lower, upper, taken, with_tools(layers, tools), marks)
 
 

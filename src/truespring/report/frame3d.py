@@ -80,7 +80,7 @@ def _layout(picture: Picture) -> _Layout:
     columns, words = legend_columns(picture.legend, 5.0)
     words = max(words, text_width(picture.title, 9, bold=True), text_width(picture.remark, 8))
     words = max(words, text_width(picture.bar.label, 8)) if picture.bar else words
-    top = _TOP + ROW * len(columns[0]) + ROW * bool(picture.remark) + BAR * bool(picture.bar)
+    top = _TOP + ROW * max(map(len, columns), default=0) + ROW * bool(picture.remark) + BAR * bool(picture.bar)
     extent = picture.upper - picture.lower
     inch = float(max(extent[0] / 5.4, extent[1] / 4.4))  # [m] on paper
     arm = _round_length(0.15 * float(extent.max()))

@@ -53,7 +53,7 @@ def node_fields(path: Solution, state: State) -> dict[str, Floats]:
     fields = path.potential.cell_fields(state.all_positions)
     lines, elements = _divided(path.potential.cells, fields)
     if "stress" in elements and len(elements["stress"]) == len(mesh.elements):
-        found["stress"] = _von_mises(_mean(mesh, _in_order(mesh, elements["stress"]).reshape(-1, 3, 3)))
+        found["stress"] = von_mises(_mean(mesh, in_order(mesh, elements["stress"]).reshape(-1, 3, 3)))
     energies = {name: of["strain_energy"] for name, of in (("lines", lines), ("elements", elements)) if _has(of)}
     total = sum(float(one.sum()) for one in energies.values())
     if not energies or abs(total - state.energy) > _MISSING * abs(state.energy):
@@ -61,7 +61,7 @@ def node_fields(path: Solution, state: State) -> dict[str, Floats]:
     thickness = path.problem.body.thickness
     at_rest, now = (thickness * mesh.measures_at(positions) for positions in (mesh.nodes, state.positions))
     if "elements" in energies and len(energies["elements"]) == len(mesh.elements):
-        found["energy"] = _mean(mesh, _in_order(mesh, energies["elements"]) / at_rest)
+        found["energy"] = _mean(mesh, in_order(mesh, energies["elements"]) / at_rest)
     elif "lines" in energies:
         spread = _Spread.of(mesh, path.potential.cells["line"])
         if spread is None:
@@ -70,7 +70,7 @@ def node_fields(path: Solution, state: State) -> dict[str, Floats]:
         section = path.problem.section
         if "tension" in lines and (section is None or not section.moduli_words):  # not in plane strain
             virial = spread.sums(_virial(spread.ends, lines["tension"], in_space(state.positions)).reshape(-1, 9))
-            found["stress"] = _von_mises(_mean(mesh, virial.reshape(-1, 3, 3) / now[:, None, None]))
+            found["stress"] = von_mises(_mean(mesh, virial.reshape(-1, 3, 3) / now[:, None, None]))
     return found
 
 
@@ -86,7 +86,7 @@ def _divided(cells: Mapping[str, Ints], fields: Mapping[str, Floats]) -> tuple[d
     return lines, elements
 
 
-def _in_order(mesh: Mesh, values: Floats) -> Floats:
+def in_order(mesh: Mesh, values: Floats) -> Floats:
     """Return values of elements in the order of `mesh.cells` in that of the mesh."""
     found = np.empty_like(values)
     found[np.concatenate([numbers for numbers, _ in mesh.blocks])] = values
@@ -168,7 +168,7 @@ def _virial(ends: Ints, tension: Floats, positions: Floats) -> Floats:
     return np.asarray(np.einsum("s,si,sj->sij", tension / np.linalg.norm(along, axis=1), along, along))
 
 
-def _von_mises(stress: Floats) -> Floats:
+def von_mises(stress: Floats) -> Floats:
     """Return sqrt(3/2 s : s), s the deviator of the stress, shape (n,)."""
     deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))))

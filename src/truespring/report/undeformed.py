@@ -38,9 +38,15 @@ class Undeformed:
         counts += [f"{len(self.springs)} {self.springs_are}"] if self.springs is not None else []
         return f"Undeformed: {', '.join(counts)}"
 
-    def legend(self, elements: bool) -> tuple[Entry, ...]:
-        """Return the legend, with an entry for elements if `elements` are drawn."""
-        entries = [Entry("elements", INK)] if elements else []
+    @property
+    def has_elements(self) -> bool:
+        """Whether elements are drawn: of a network only if its springs, which are at the same places, are not."""
+        return not self.is_cloud and (self.problem.mesh.element != "line" or self.springs is None)
+
+    @property
+    def legend(self) -> tuple[Entry, ...]:
+        """The legend: what is drawn."""
+        entries = [Entry("elements", INK)] if self.has_elements else []
         entries += [Entry(self.springs_are, BLUE)] if self.springs is not None else []
         entries += [Entry("probe", RED, "o", "")] if self.probe is not None else []
         return tuple(entries)

@@ -232,6 +232,9 @@
     });
     const asked = () => (under >= 0 ? under : kept);
 
+    // A text as HTML: labels may be names of files.
+    const plain = (text) => Object.assign(document.createElement("span"), { textContent: text }).innerHTML;
+
     // A length in the unit of the view, no finer than the data are.
     const round = (value, step) => +(Math.round(value / step) * step).toPrecision(3);
     const vector = (values) => `(${values.join(", ")}) ${data.unit}`.replaceAll("-", "−");
@@ -245,7 +248,7 @@
       const parts = [
         `node <b>${data.numbers.length ? data.numbers[node] : node}</b> at rest at ${vector(rest)}`,
         `displacement <b>${vector(moved.map((value) => round(value, unit / data.factor)))}</b>`,
-        `${round(Math.hypot(...moved), unit / data.factor)} ${data.unit} in all`, ...data.ask.values(node, shown),
+        `${round(Math.hypot(...moved), unit / data.factor)} ${data.unit} in all`, ...data.ask.values(node, shown).map(plain),
       ];
       words.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
     }

@@ -63,6 +63,8 @@ def _frames(pair: Pair) -> tuple[_Frames, Floats]:
 def _colored_frames(pair: Pair, color: str) -> tuple[_Frames, Floats]:
     """Return frames in colours, the same for the same values, at most FRAMES of them; and the colours."""
     states = [state for state in states_of_both(pair) if state.level is not None]
+    if not states:
+        return [], np.zeros((0, 3))
     chosen = np.unique(np.rint(np.linspace(0, len(states) - 1, min(FRAMES, len(states)))).astype(int))
     pictures = pictures_of(pair, [states[number] for number in chosen], color, None)
     return _drawn(pictures), np.concatenate([_palette(one.scene.paint) for one in pictures[:1] if one.scene.paint])

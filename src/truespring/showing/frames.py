@@ -95,16 +95,20 @@ def _arm(size: float) -> float:
 
 
 def draw_image(axes: "Axes", layers: Sequence[Layer], low: Floats, high: Floats, accurate: bool = False) -> None:
-    """Draw layers as an image: by matplotlib, which sorts faces by depth, or by PyVista if they are many.
+    """Draw layers as an image, see `image_of`."""
+    pixels = round(_IMAGE * _DPI), round(_IMAGE * _DPI * float((high - low)[1] / (high - low)[0]))
+    image = image_of(Shot(tuple(layers), low, high, pixels, _DPI / 72), accurate)
+    axes.imshow(image, extent=(low[0], high[0], low[1], high[1]), zorder=2, gid="image", aspect="equal")
+    _show_box(axes, low, high)
+
+
+def image_of(shot: Shot, accurate: bool) -> Any:
+    """Return the pixels of a shot: by matplotlib, which sorts faces by depth, or by PyVista if they are many.
 
     With `accurate`, PyVista draws in any case, as faces of very different size need it.
     """
-    pixels = round(_IMAGE * _DPI), round(_IMAGE * _DPI * float((high - low)[1] / (high - low)[0]))
-    shot = Shot(tuple(layers), low, high, pixels, _DPI / 72)
-    quick = not accurate and sum(len(layer.faces) for layer in layers) <= _MANY_FACES
-    image = draw(shot) if quick else render([shot])()[0][0]
-    axes.imshow(image, extent=(low[0], high[0], low[1], high[1]), zorder=2, gid="image", aspect="equal")
-    _show_box(axes, low, high)
+    quick = not accurate and sum(len(layer.faces) for layer in shot.layers) <= _MANY_FACES
+    return draw(shot) if quick else render([shot])()[0][0]
 
 
 def draw_lines(

@@ -9,6 +9,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import OutputError, nearest, shown
 from truespring.potential import Visible
+from truespring.report.nodal import in_order, von_mises
 from truespring.showing.pairs import Pair
 from truespring.solution import Solution, State
 
@@ -119,14 +120,12 @@ def _tension(pair: Pair, state: State) -> Paint | None:
 
 
 def _stress(pair: Pair, state: State) -> Paint | None:
-    """Von Mises stress of the elements: sqrt(3/2 s : s), s the deviator of the true stress."""
+    """Von Mises stress of the elements, of their true stress."""
     solution = pair.solution
     fields = _element_fields(solution, state)
     if "stress" not in fields:
         return None
-    stress = fields["stress"].reshape(-1, 3, 3)
-    deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
-    return Paint("von Mises stress", "Pa", "elements", np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))))
+    return Paint("von Mises stress", "Pa", "elements", von_mises(fields["stress"].reshape(-1, 3, 3)))
 
 
 def _line_fields(solution: Solution, state: State) -> tuple[Ints, dict[str, Floats]]:
@@ -156,11 +155,9 @@ def _element_fields(solution: Solution, state: State) -> dict[str, Floats]:
     of_elements = np.concatenate([np.full(len(cells), kind != "line") for kind, cells in potential.cells.items()])
     if of_elements.sum() != len(mesh.elements):
         return {}
-    order = np.concatenate([numbers for numbers, _ in mesh.blocks])
     found = {}
     for name, values in potential.cell_fields(state.all_positions).items():
-        own = np.empty((len(mesh.elements), *values.shape[1:]))
-        own[order] = values[of_elements]
+        own = in_order(mesh, values[of_elements])
         if not np.isnan(own).all():
             found[name] = own
     return found

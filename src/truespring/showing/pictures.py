@@ -118,7 +118,7 @@ def _factor(pair: Pair, magnify: float | None) -> float:
     over = pair.over
     if over is not None and not over.states:
         if magnify not in (None, 1):
-            raise OutputError(f"magnify = {magnify:g}: {over.label} is a surface, whose displacement is not known")
+            raise OutputError(f"magnify = {shown(magnify)}: {over.label} is a surface, whose displacement is not known")
         return 1.0
     if magnify is None:
         return magnification(pair.result)

@@ -8,18 +8,16 @@ from truespring.problem import Problem
 from truespring.report.bodies import undeformed_figure
 from truespring.report.bodies3d import undeformed_picture
 from truespring.report.frame3d import figure_of, shot
-from truespring.report.render import draw, render
 from truespring.report.sheet import Sheet
 from truespring.report.style import figure_style
 from truespring.report.undeformed import Undeformed, spring_lines
+from truespring.showing.frames import image_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Resolution [pixels/inch].
 _DPI = 200
-# Faces beyond this number are drawn by PyVista, whose process takes seconds to start.
-_MANY_FACES = 20_000
 
 
 def plot_problem(problem: Problem, model: "Model | Potential | None", axes: "Axes | None") -> "Axes":
@@ -43,6 +41,4 @@ def undeformed_sheet(problem: Problem, model: "Model | Potential | None") -> She
     if problem.mesh.dim == 2:
         return undeformed_figure(body)
     picture = undeformed_picture(body)
-    job = shot(picture)
-    quick = not problem.tools and sum(len(layer.faces) for layer in job.layers) <= _MANY_FACES
-    return figure_of(picture, draw(job) if quick else render([job])()[0][0])
+    return figure_of(picture, image_of(shot(picture), accurate=bool(problem.tools)))

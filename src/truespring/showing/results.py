@@ -1,4 +1,4 @@
-"""What a Result tells and writes: verdict and report."""
+"""Verdict and report of a result."""
 
 from pathlib import Path
 

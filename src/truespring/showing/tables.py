@@ -7,7 +7,7 @@ import numpy as np
 
 from truespring.comparison import most_moved
 from truespring.errors import OutputError
-from truespring.mesh import named_point, nearest_node
+from truespring.mesh import probe_node
 from truespring.mesh.selections import AXES
 from truespring.solution import Solution, State
 
@@ -22,23 +22,9 @@ def columns_of(solution: Solution, probe: Probe) -> dict[str, tuple[str, list[An
     """Return the columns of the table of load levels: unit and values, one a state, by name."""
     if not solution.states:
         raise OutputError(f"{solution.label} is a surface without load levels: it has no table")
-    watched = _watched(solution, probe)
+    watched = most_moved(solution) if probe is None else probe_node(solution.problem.mesh, probe)
     rows = [_row(solution, state, watched) for state in solution.states]
     return {name: (unit, [row[name][1] for row in rows]) for name, (unit, _) in rows[0].items()}
-
-
-def _watched(solution: Solution, probe: Probe) -> int:
-    """Return the number of the probe node; raise OutputError or MeshError if there is no such node."""
-    mesh = solution.problem.mesh
-    if probe is None:
-        return most_moved(solution)
-    if isinstance(probe, str):
-        return named_point(mesh, probe)
-    if not isinstance(probe, int | np.integer):
-        return nearest_node(mesh, probe)
-    if not 0 <= probe < mesh.n_nodes:
-        raise OutputError(f"probe = {probe}: nodes are 0 to {mesh.n_nodes - 1}; or a point such as 'right-middle'")
-    return int(probe)
 
 
 def _row(solution: Solution, state: State, probe: int) -> dict[str, tuple[str, Any]]:

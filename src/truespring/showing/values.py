@@ -6,6 +6,8 @@ Values of rooms above this one make theirs themselves, by `Card`.
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
+
 from truespring.comparison import Comparison
 from truespring.mesh import Mesh
 from truespring.models import Moduli
@@ -75,7 +77,7 @@ def _solution_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     axis = axis_of(Pair(solution).result)
     yield "reached", f"{axis.exact(solution.load_factor)}, {len(solution.states)} levels"
     last = solution.states[-1]
-    yield "largest displacement", quantity(float(abs(last.displacement).max()), "m")
+    yield "largest displacement", quantity(float(np.linalg.norm(last.displacement, axis=1).max()), "m")
     if last.stretch is not None:
         yield "stretch of springs", "{:.3f} to {:.3f}".format(*last.stretch)
     if solution.solved:

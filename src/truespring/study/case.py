@@ -5,11 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from truespring.comparison import TOLERANCE
-from truespring.errors import MeshError, ProblemError, nearest, shown
-from truespring.mesh import Mesh, named_point, nearest_node
+from truespring.errors import ProblemError, nearest, shown
+from truespring.mesh import probe_node
 from truespring.models import Model, as_model, check_fibres
 from truespring.potential import Potential
 from truespring.problem import Problem
@@ -74,14 +72,16 @@ def case_of(
 ) -> Case:
     """Return the case of a problem with models by name, which are compared as those of a study.
 
-    Raises ProblemError if there is no model, if a name is unknown or cannot be that of a file, or if `tolerance` is
-    not between 0 and 1, ModelError if a model has the wrong type or does not fit the problem, MeshError if the probe
-    does not exist.
+    Raises ProblemError if there is no model, if a name is unknown or cannot be that of a file, if `tolerance` is not
+    between 0 and 1 or `title` is not a text, ModelError if a model has the wrong type or does not fit the problem,
+    MeshError if the probe does not exist.
     """
     if not models or not isinstance(models, Mapping):
         raise ProblemError("verify needs models: models={'springs': Springs(rule='gaussian'), 'fem': Fem(...)}")
     if not isinstance(tolerance, int | float) or not 0 < tolerance < 1:
         raise ProblemError(f"tolerance = {shown(tolerance)} is not between 0 and 1")
+    if not isinstance(title, str) or not title.strip():
+        raise ProblemError(f"title = {shown(title)}: a text is expected, such as 'my body'")
     for name in models:
         if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
             raise ProblemError(f"models: '{name}' is not a name: use letters, digits, - and _, such as 'springs'")
@@ -96,21 +96,10 @@ def case_of(
         entries=entries,
         model=compared,
         references=reference_names(entries, compared, references),
-        probe=None if probe is None else _node(problem.mesh, probe),
+        probe=None if probe is None else probe_node(problem.mesh, probe),
         tolerance=tolerance,
         refine=refine,
     )
-
-
-def _node(mesh: Mesh, probe: int | str | Sequence[float]) -> int:
-    """Return the number of the probe's node; raise MeshError if there is none."""
-    if isinstance(probe, str):
-        return named_point(mesh, probe)
-    if not isinstance(probe, int | np.integer):
-        return nearest_node(mesh, probe)
-    if not 0 <= probe < mesh.n_nodes:
-        raise MeshError(f"probe = {probe}: the mesh has {mesh.n_nodes} nodes, counted from 0")
-    return int(probe)
 
 
 def compared_model(models: Mapping[str, Model], model: str | None = None) -> str:
@@ -131,8 +120,8 @@ def reference_names(models: Mapping[str, Model], model: str, references: Sequenc
     """
     if references is None:
         return tuple(name for name in models if name != model)
-    if isinstance(references, str):
-        raise ProblemError(f"references = '{references}': a list of names is expected, such as ['{references}']")
+    if isinstance(references, str) or not isinstance(references, Sequence):
+        raise ProblemError(f"references = {shown(references)}: a list of names is expected, such as ['fem']")
     for reference in references:
         if _known(models, reference) == model:
             raise ProblemError(
@@ -142,6 +131,6 @@ def reference_names(models: Mapping[str, Model], model: str, references: Sequenc
 
 
 def _known(models: Mapping[str, Model], name: str) -> str:
-    if name not in models:
-        raise ProblemError(f"'{name}' is not among the models{nearest(name, models)}: {', '.join(models)}")
+    if not isinstance(name, str) or name not in models:
+        raise ProblemError(f"{shown(name)} is not among the models{nearest(str(name), models)}: {', '.join(models)}")
     return name
