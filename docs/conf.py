@@ -53,7 +53,7 @@ nb_merge_streams = True
 # API: from the docstrings, which are in Google style and plain text.
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
-autodoc_default_options = {"members": True, "undoc-members": False}
+autodoc_default_options = {"members": True}  # a field is described in the list of its class
 autoclass_content = "class"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
@@ -86,6 +86,7 @@ sphinx_gallery_conf = {
     "only_warn_on_example_error": True,
 }
 
+smartquotes = False  # options such as --quiet and strings are code
 html_theme = "pydata_sphinx_theme"
 html_title = f"truespring {release}"
 # MathJax beside the pages: formulas need no network. The extension of this package is not safe in parallel builds.

@@ -1,6 +1,7 @@
 """The verbs of the command line, from their parsers."""
 
 import argparse
+import re
 from collections.abc import Iterator
 
 from truespring.cli.parser import VERBS, build_parser
@@ -14,7 +15,7 @@ def commands() -> str:
 
 def verb(name: str, parser: argparse.ArgumentParser) -> Iterator[str]:
     """Yield the lines of a verb."""
-    yield from ("", f"(verb-{name})=", f"## {name}", "", escaped(parser.description or ""), "")
+    yield from ("", f"(verb-{name})=", f"## {name}", "", *described(parser.description or ""), "")
     yield from ("```text", parser.format_usage().removeprefix("usage: ").rstrip(), "```", "")
     shown = [action for action in parser._actions if action.help != argparse.SUPPRESS]
     if shown:
@@ -22,6 +23,15 @@ def verb(name: str, parser: argparse.ArgumentParser) -> Iterator[str]:
         yield from (f"| {names(action)} | {escaped(action.help or '')} |" for action in shown)
     examples = (VERBS[name].examples,)
     yield from ("", "Examples:", "", "```sh", *(line for lines in examples for line in lines), "```", "")
+
+
+def described(text: str) -> Iterator[str]:
+    """Yield the description of a verb; indented lines of a name and its text as a list."""
+    for part in re.split(r"\n\s*\n", text.strip()):
+        rows = re.findall(r"^ +(\S+) {2,}(.*)$", part, re.MULTILINE)
+        yield from (escaped(part.partition("\n")[0] if rows else part), "")
+        yield from (f"* `{name}`: {escaped(meaning)}" for name, meaning in rows)
+        yield ""
 
 
 def names(action: argparse.Action) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from commands import commands
+from docutils import nodes
 from public_names import public_names, write_pages
 from sources import rule_sources
 from study_keys import study_keys
@@ -48,7 +49,7 @@ def _one_name_each(lines: list[str]) -> list[str]:
 def _docstring(app: Any, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
     """Keep formulas: outside code, a star, a bar or a final underscore is itself."""
     if what in ("attribute", "property", "data"):
-        lines.insert(0, "")  # else napoleon reads what is before a colon of the first line as a type
+        lines[:0] = ["..", ""]  # an empty comment: napoleon reads what is before a colon of the first line as a type
     lines[:] = _one_name_each(lines)
     code = False
     for number, line in enumerate(lines):
@@ -60,6 +61,13 @@ def _docstring(app: Any, what: str, name: str, thing: object, options: object, l
         lines[number] = "".join(part if k % 2 else _MARK.sub(r"\\\1", part) for k, part in enumerate(parts))
 
 
+def _dashes(app: Any, page: nodes.document) -> None:
+    """Write a dash between the name of a parameter and its text, where Sphinx has two signs."""
+    for text in list(page.findall(nodes.Text)):
+        if text.astext() == " -- ":
+            text.parent.replace(text, nodes.Text(" \N{EN DASH} "))
+
+
 def _pages(app: Any) -> None:
     write_pages(Path(app.srcdir) / "reference" / "api")
 
@@ -68,6 +76,7 @@ def setup(app: Any) -> dict[str, Any]:
     """Connect to the events of a build."""
     app.connect("builder-inited", _pages)
     app.connect("source-read", _read)
+    app.connect("doctree-read", _dashes)
     # Before napoleon, whose own marks stay.
     app.connect("autodoc-process-docstring", _docstring, priority=100)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

@@ -72,7 +72,7 @@ def public_names() -> str:
     check()
     lines: list[str] = []
     for topic, names in TOPICS.items():
-        lines += [f"## {topic}", "", "| | |", "|---|---|"]
+        lines += [f"## {topic}", "", "| name | content |", "|---|---|"]
         lines += [f"| [`{name}`](api/{name}.rst) | {summary(name)} |" for name in names]
         lines += ["", "```{toctree}", ":hidden:", "", *(f"api/{name}" for name in names), "```", ""]
     return "\n".join(lines)

@@ -73,7 +73,8 @@ def form(schema: dict[str, Any]) -> str:
     if "patternProperties" in schema:
         return "a table for each name: " + form(next(iter(schema["patternProperties"].values())))
     if schema.get("type") == "array":
-        return f"list of {numbers(schema)}{form(schema.get('items', {}))}"
+        count, each = numbers(schema), form(schema.get("items", {}))
+        return f"list of {count}values: {each}" if count else f"list of {each}"
     if schema.get("type") == "object":
         keys = ", ".join(f"{key} = {form(one)}" for key, one in schema.get("properties", {}).items())
         return f"{{ {keys} }}" if keys else "table"
@@ -107,7 +108,7 @@ def references(schema: Any) -> Iterator[str]:
 
 
 def words(head: str) -> str:
-    """Return the name of a table in words: `BemSpringsKeys` is "bem springs"."""
+    """Return the name of a table in words: `NetworkFilesKeys` is "network files"."""
     return re.sub(r"(?<!^)(?=[A-Z])", " ", head.removesuffix("Keys")).lower()
 
 
