@@ -2,6 +2,7 @@
 
 import functools
 import http.server
+import re
 import shutil
 import subprocess
 import sys
@@ -26,6 +27,14 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     from generated import PARTS
 
     return {name: make() for name, make in PARTS.items()}
+
+
+def test_no_line_of_a_page_is_a_comment_of_myst() -> None:
+    # A line that begins with a percent sign is left out of the page, and splits the sentence.
+    pages = [page for page in DOCS.rglob("*.md") if "_build" not in page.parts]
+    assert len(pages) > 80
+    prose = {page: re.sub(r"```.*?```|\$\$.*?\$\$", "", page.read_text("utf-8"), flags=re.DOTALL) for page in pages}
+    assert not {page.name: lines for page, text in prose.items() if (lines := re.findall(r"^ *%.*", text, re.M))}
 
 
 def test_generated_parts_hold_every_key_verb_and_name(parts: dict[str, str]) -> None:
