@@ -27,7 +27,7 @@ def picture() -> Figure:
     figure.subplots_adjust(left=0.01, right=0.99, top=0.89, bottom=0.01, wspace=0.03, hspace=0.12)
     for row, name in zip(axes, ("bending", "stretching"), strict=True):
         result = run(read_study(ROOT / "examples" / f"{name}.toml"))
-        springs = result.paths["springs"]
+        springs = result.solutions["springs"]
         everything = []
         for ax, reference in zip(row, ("linear", "nonlinear"), strict=True):
             comparison = result.comparisons[reference]

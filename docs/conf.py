@@ -11,7 +11,7 @@ ROOT = DOCS.parent
 sys.path.insert(0, str(DOCS / "_ext"))
 
 _project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-_quick = tags.has("quick")  # type: ignore[name-defined]  # noqa: F821
+_quick = tags.has("quick")  # type: ignore[name-defined]  # noqa: F821  Sphinx defines it
 
 project = "truespring"
 author = "The truespring developers"

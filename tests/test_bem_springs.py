@@ -457,9 +457,9 @@ def test_a_study_takes_it(tmp_path: Path) -> None:
     assert result.converged
     assert 0 < result.comparisons["linear"].rms_error < 0.15  # of which FEM on so coarse a mesh has most
     write(result, tmp_path / "out", report=False)
-    springs = result.paths["springs"].potential
+    springs = result.solutions["springs"].potential
     assert isinstance(springs, BlockSprings)
-    drawn = path_lines(result.paths["springs"])
+    drawn = path_lines(result.solutions["springs"])
     assert len(drawn) > len(springs.springs) and set(drawn.ravel().tolist()) == set(range(27))
     kinds = json.loads((tmp_path / "out" / "study" / "summary.json").read_text("utf-8"))["models"]
     assert kinds["springs"]["kind"] == "bem-springs"

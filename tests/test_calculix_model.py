@@ -342,7 +342,7 @@ def test_ansys_vm9_settles_in_calculix(tmp_path: Path) -> None:
     (tmp_path / "springs.csv").write_text("a,b,stiffness\na,b,8\nb,c,1\n")
     file = written(tmp_path, NETWORK)
     assert main(["solve", str(file), "--out", str(tmp_path), "--quiet"]) == 0
-    paths = run(read_study(file)).paths
+    paths = run(read_study(file)).solutions
     assert gap(paths["theirs"], paths["ours"]) < 1e-6
     assert paths["theirs"].states[-1].displacement[1] == pytest.approx([8.6321, 4.5319, 0.0], rel=1e-3)
     assert paths["theirs"].states[-1].energy == pytest.approx(24.0116, rel=1e-5)

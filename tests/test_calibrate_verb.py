@@ -66,8 +66,10 @@ def test_the_calibrated_study_runs_and_gives_the_errors_that_it_tells(out: Path)
     # The study's own reference is of first order; what was fitted to is that refined.
     assert result.standings["neo"].refined_error == pytest.approx(fitted["error_after"], rel=1e-6)
     assert "neo-Hookean FEM of second order on the same nodes, itself about" in values["headline"]
-    rule = result.paths["springs"]
-    assert rule.moduli is not None and result.paths["calibrated"].moduli is None  # none are told that are the rule's
+    rule = result.solutions["springs"]
+    assert (
+        rule.moduli is not None and result.solutions["calibrated"].moduli is None
+    )  # none are told that are the rule's
     head = result.note
     assert values["headline"] in head and "springs (lloyd)" in head.lower()
 
@@ -109,7 +111,7 @@ def test_json_is_all_that_stands_on_standard_output(tmp_path: Path, capsys: pyte
 
 def test_markers_are_fitted_and_nothing_is_held_out_which_is_said(tmp_path: Path) -> None:
     study = read_study(written(tmp_path, changed(REFERENCE)))
-    path = run(study).paths["neo"]
+    path = run(study).solutions["neo"]
     places = np.array([[0.021, 0.004], [0.038, 0.0075]])
     moved = path.whole.locate(places).carry(path.states[-1].displacement)
     rows = [",".join(f"{1e3 * value:.12g}" for value in (*at, *u)) for at, u in zip(places, moved, strict=True)]

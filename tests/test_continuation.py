@@ -133,6 +133,30 @@ def test_a_column_buckles_at_the_load_of_euler(depth: int) -> None:
     assert path.states[-1].negative_eigenvalues == 1
 
 
+@pytest.mark.parametrize("n", [20, 40])
+def test_a_bifurcation_is_found_or_a_warning_says_that_it_was_not(n: int) -> None:
+    """Euler's load of a column of quadratic springs; on the coarser mesh no equilibrium is found near the point."""
+    young, length, width = 1e6, 0.4, 0.01
+    euler = math.pi**2 * young * width**4 / 12 / (4 * length**2)
+    problem = ts.Problem(
+        ts.rectangle((width, length), (2, n), "triangle", diagonal="alternating"),
+        ts.Material(young, 0.3),
+        ts.PlaneStress(width),
+        ts.Fixed("bottom"),
+        ts.Force("top", (0.0, -1.2 * euler)),
+    )
+    path = ts.solve(problem, ts.Springs("gaussian", element="quadratic"), ts.ArcLength(load_steps=6))
+    assert path.states[0].negative_eigenvalues == 0 and path.states[-1].negative_eigenvalues == 1
+    points = critical(path, "bifurcation")
+    missed = [warning for warning in path.warnings if warning.startswith("stability changes between load factors")]
+    assert len(points) + len(missed) == 1
+    if points:
+        assert 1.2 * points[0].load_factor == pytest.approx(1.0, abs=2e-3)
+    else:
+        last, there = (state.load_factor for state in path.states[-2:])
+        assert f"{last:.6g} and {there:.6g}" in missed[0] and 1.2 * last < 1 < 1.2 * there
+
+
 # --- with FEM, motion, and what cannot be done -------------------------------------------------------------------
 
 

@@ -127,7 +127,7 @@ def test_the_tables_of_errors_are_against_the_truth_of_each_law() -> None:
     pages = [page.read_text(encoding="utf-8") for page in (ROOT / "README.md", STUDIES)]
     results = [run(read_study(EXAMPLES / f"{name}.toml")) for name in ("stretching", "bending")]
     for name in results[0].comparisons:
-        label = results[0].paths[name].label
+        label = results[0].solutions[name].label
         readme, row = (
             re.search(rf"^\| {re.escape(label)} \| ([\d.]+) % \| ([\d.]+) % \|", page, re.MULTILINE) for page in pages
         )

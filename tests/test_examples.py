@@ -51,7 +51,7 @@ def test_every_example_is_run_here() -> None:
 def test_the_errors_of_the_shipped_motions_are_separate(name: str) -> None:
     """Figures of docs/accuracy/studies.md: the gripped block; the liver's probe presses and rubs; a session lets go."""
     result = run(read_study(EXAMPLES / f"{name}.toml"))
-    assert result.converged, [path.warnings for path in result.paths.values()]
+    assert result.converged, [path.warnings for path in result.solutions.values()]
     model, splits = result.comparisons["fem"].rms_error, result.splits
     assert model is not None and splits is not None and splits.step is not None
     assert splits.solver == 0.0
@@ -59,18 +59,18 @@ def test_the_errors_of_the_shipped_motions_are_separate(name: str) -> None:
         assert (model, splits.step) == (pytest.approx(0.018, abs=5e-4), pytest.approx(1e-4, abs=5e-5))
     elif name == "pulled":  # undamped, it swings on after the release, and phases part
         assert (model, splits.step) == (pytest.approx(0.058, abs=2e-3), pytest.approx(6e-3, abs=2e-3))
-        acts = [state.touches[0].acts for state in result.paths["springs"].states]
+        acts = [state.touches[0].acts for state in result.solutions["springs"].states]
         assert not acts[0] and acts[40] and not acts[-1]
     else:
         assert model < 0.02 and splits.step < 1e-3
-        last = result.paths["springs"].states[-1].touches[0]
+        last = result.solutions["springs"].states[-1].touches[0]
         assert last.force[0] > 1e-3 and abs(last.force[1]) > 1e-4
 
 
 def test_six_methods_stand_side_by_side() -> None:
     result = run(read_study(EXAMPLES / "six_methods.toml"), refining=False)
     assert result.converged
-    assert {path.kind for path in result.paths.values()} == {
+    assert {path.kind for path in result.solutions.values()} == {
         "springs",
         "fem",
         "terzopoulos",
@@ -85,7 +85,7 @@ def test_six_methods_stand_side_by_side() -> None:
 
 
 def test_the_truss_snaps_through_at_its_exact_limit_loads() -> None:
-    study, twin = run(read_study(EXAMPLES / "truss.toml")).paths["truss"], script("truss").main()
+    study, twin = run(read_study(EXAMPLES / "truss.toml")).solutions["truss"], script("truss").main()
     assert study.complete and [state.critical for state in study.states].count("limit point") == 2
     limit = 2000 * (1 - (1 / math.hypot(1.0, 0.2)) ** (2 / 3)) ** 1.5
     for path in (study, twin):
@@ -97,10 +97,10 @@ def test_the_truss_snaps_through_at_its_exact_limit_loads() -> None:
 @pytest.mark.parametrize("name", ["stretching", "bending"])
 def test_every_model_of_the_shipped_studies_converges(name: str) -> None:
     result = solved(name)
-    assert list(result.paths) == ["springs", "gaussian", "linear", "nonlinear", "neo-hookean", "hencky"]
+    assert list(result.solutions) == ["springs", "gaussian", "linear", "nonlinear", "neo-hookean", "hencky"]
     assert result.converged
     assert result.problem.mesh.nodes[result.probe] == pytest.approx([0.16, 0.02])
-    for path in result.paths.values():
+    for path in result.solutions.values():
         assert path.load_factors == pytest.approx(np.linspace(0, 1, 11))
 
 
@@ -132,27 +132,27 @@ def test_in_bending_springs_end_nearer_to_nonlinear_than_to_linear_fem() -> None
 
 def test_stretching_reaches_about_30_percent() -> None:
     """Where Lloyd's springs cross the linear line: 0.29976 against 0.30000 at a uniform stretch of 1.3."""
-    springs = solved("stretching").paths["springs"]
+    springs = solved("stretching").solutions["springs"]
     assert springs.states[-1].displacement[solved("stretching").probe, 0] / 0.16 == pytest.approx(0.30, abs=0.005)
 
 
 def test_bending_reaches_half_the_length() -> None:
-    springs = solved("bending").paths["springs"]
+    springs = solved("bending").solutions["springs"]
     assert springs.states[-1].displacement[solved("bending").probe, 1] / 0.16 == pytest.approx(-0.53, abs=0.02)
 
 
 def test_gaussian_springs_follow_fem_that_does_not_lock() -> None:
     result = solved("soft_block")
     assert result.converged
-    assert result.paths["neo-hookean"].potential.interpolation == "mean-dilatation"
+    assert result.solutions["neo-hookean"].potential.interpolation == "mean-dilatation"
     for name in ("gaussian", "springs"):
-        assert result.paths[name].moduli.poisson() == pytest.approx(0.45, abs=1e-12)
+        assert result.solutions[name].moduli.poisson() == pytest.approx(0.45, abs=1e-12)
     errors = result.comparisons
     assert errors["neo-hookean"].agrees_up_to_load_factor == 1.0
     assert (
         errors["neo-hookean"].rms_error < 0.01 < 0.05 < errors["springs"].rms_error < 0.3 < errors["linear"].rms_error
     )
-    gaussian = result.paths["gaussian"].states[-1]
+    gaussian = result.solutions["gaussian"].states[-1]
     assert gaussian.displacement[result.probe, 1] / 0.16 == pytest.approx(-0.56, abs=0.01)
 
 
@@ -160,7 +160,7 @@ def test_a_muscle_shortens_and_its_tendon_is_stretched() -> None:
     result = solved("muscle")
     assert result.converged
     assert result.comparisons["neo-hookean"].rms_error < 0.015
-    moved = result.paths["springs"].states[-1].displacement
+    moved = result.solutions["springs"].states[-1].displacement
     nodes = result.problem.mesh.nodes
     ends = {x: moved[np.isclose(nodes[:, 0], x)].mean(axis=0) for x in (0.06, 0.08)}
     tendon = np.linalg.norm(ends[0.08] - ends[0.06] + [0.02, 0.0])  # it turns, too
@@ -173,7 +173,7 @@ def test_springs_on_an_imported_mesh_are_finite_elements() -> None:
     result = solved("tissue", load_steps=1)
     assert result.converged
     assert result.problem.mesh.notes == ()
-    paths = result.paths
+    paths = result.solutions
     assert compare(paths["biquadratic"], paths["saint-venant-kirchhoff"]).max_error < 1e-8
     assert result.comparisons["neo-hookean"].rms_error < 0.02
     assert result.comparisons["biquadratic"].rms_error > 0.1
@@ -206,4 +206,4 @@ def test_the_organ_is_solved_as_its_twin() -> None:
     assert result.converged
     for reference, comparison in result.comparisons.items():
         assert twins[reference].rms_errors == pytest.approx(comparison.rms_errors, rel=1e-5)
-    assert all(path.cost and path.cost.linear.endswith("multigrid") for path in result.paths.values())
+    assert all(path.cost and path.cost.linear.endswith("multigrid") for path in result.solutions.values())

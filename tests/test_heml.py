@@ -321,7 +321,7 @@ def test_a_study_of_them(tmp_path: Path) -> None:
     assert result.converged
     assert result.comparisons["tensors"].rms_error == pytest.approx(0, abs=1e-8)
     assert result.comparisons["rubber"].rms_error > 1e-4
-    ends = {name: path.states[-1].displacement for name, path in result.paths.items()}
+    ends = {name: path.states[-1].displacement for name, path in result.solutions.items()}
     assert apart(ends["sums"], ends["linear"]) < 1e-10
     assert apart(ends["sums"], ends["tensors"]) > 1e-3
     write(result, tmp_path / "out")

@@ -1,7 +1,6 @@
 """The page of a live session in headless Chromium: it pulls by the mouse, watches, and asks nothing of others."""
 
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,35 +10,12 @@ from typing import Any
 import pytest
 
 import truespring
+from tests.browser import MARKS
 from truespring.study import read_study
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
 EXAMPLES = Path(truespring.__file__).parent / "examples"
 
-pytestmark = [
-    pytest.mark.verification,
-    pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium"),
-    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
-]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as started:
-        opened = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield opened
-        opened.close()
+pytestmark = MARKS
 
 
 @pytest.fixture(params=["block.toml", "strip.toml"])

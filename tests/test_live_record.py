@@ -278,8 +278,8 @@ def test_the_errors_of_what_was_seen_are_separate(tmp_path: Path) -> None:
     live = play(opened(study_of(tmp_path)), frames=1)
     write_session(live, read_study(tmp_path / "block.toml"), tmp_path)
     result = run(read_study(tmp_path / "session.toml"))
-    assert result.converged, [path.warnings for path in result.paths.values()]
-    assert np.abs(result.paths["springs"].states[-1].positions - live.positions).max() < 1e-12 * live.size
+    assert result.converged, [path.warnings for path in result.solutions.values()]
+    assert np.abs(result.solutions["springs"].states[-1].positions - live.positions).max() < 1e-12 * live.size
     model, splits = result.comparisons["fem"].rms_error, result.splits
     assert splits is not None and splits.step is not None and model is not None
     assert 1e-4 < model < 0.2 and splits.step < 0.02 and splits.solver == 0.0

@@ -106,7 +106,7 @@ def result(
         title="A swing",
         file=Path("swing.toml"),
         problem=body,
-        paths={"springs": springs, "fem": fem},
+        solutions={"springs": springs, "fem": fem},
         probe=ts.named_point(body.mesh, "right-middle"),
         model="springs",
         comparisons={"fem": ts.compare(springs, fem)},

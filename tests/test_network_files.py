@@ -42,7 +42,7 @@ def test_a_motion_needs_masses_which_the_file_of_the_nodes_may_have(tmp_path: Pa
     study = tmp_path / "study.toml"
     study.write_text(models + moves, encoding="utf-8")
     files(tmp_path, heavy, springs)
-    (path,) = run(read_study(study)).paths.values()
+    (path,) = run(read_study(study)).solutions.values()
     assert path.states[-1].displacement == pytest.approx(np.tile([0.1, 0.0], (3, 1)))
     files(tmp_path, NODES, springs)
     with pytest.raises(TruespringError, match=r"mesh\.nodes: a motion needs the mass of the nodes: add a column mass"):

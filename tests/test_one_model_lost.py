@@ -212,7 +212,7 @@ def test_ccx_whose_time_is_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     )
     started = time.monotonic()
     study = written(tmp_path, text.replace('rule = "lloyd"', 'rule = "isotropic"'))
-    path = ts.study.run(read_study(study), comparing=False, timeout=0.2).paths["linear"]
+    path = ts.study.run(read_study(study), comparing=False, timeout=0.2).solutions["linear"]
     assert time.monotonic() - started < 60
     assert path.status is Status.NOT_CONVERGED and path.load_factor < 1
     assert "time limit of 0.2 s was reached (--timeout)" in path.warnings[0]

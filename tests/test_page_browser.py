@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,27 +11,14 @@ import pytest
 from PIL import Image
 
 import truespring
-from tests.test_live_page import CHROMIUM, FLAGS
+from tests.browser import MARKS
 from truespring.cli import main
 
 EXAMPLES = Path(truespring.__file__).parent / "examples"
 VIEWER = Path(__file__).parent.parent / "viewer"
 SIZES = {"desktop": (1200, 900), "phone": (390, 800)}
 
-pytestmark = [
-    pytest.mark.verification,
-    pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium"),
-    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
-]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as started:
-        opened = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield opened
-        opened.close()
+pytestmark = MARKS
 
 
 @pytest.fixture(scope="module")

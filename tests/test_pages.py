@@ -81,7 +81,7 @@ def test_a_study_of_a_page_is_valid(study: dict[str, Any], page: Path, tmp_path:
 @pytest.mark.parametrize(("study", "page"), list(studies()))
 def test_a_study_of_a_page_is_solved(study: dict[str, Any], page: Path, tmp_path: Path) -> None:
     found = run(read_study(written(study, page, tmp_path)))
-    assert found.converged, {name: path.warnings for name, path in found.paths.items()}
+    assert found.converged, {name: path.warnings for name, path in found.solutions.items()}
 
 
 def commands() -> dict[str, str]:

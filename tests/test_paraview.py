@@ -58,13 +58,13 @@ def test_a_study_writes_its_levels_in_a_form(form: str, tmp_path: Path, monkeypa
     write(result, tmp_path, report=False)
     folder = tmp_path / "bending"
     suffix = {"vtu": ".pvd", "vtkhdf": ".vtkhdf"}[form]
-    assert {file.stem for file in folder.glob(f"*{suffix}")} == set(result.paths)
+    assert {file.stem for file in folder.glob(f"*{suffix}")} == set(result.solutions)
     assert bool([*folder.glob("*.vtkhdf")]) != bool([*folder.glob("*/*.vtu")])
     tree = ast.parse((folder / "open_in_paraview.py").read_text(encoding="utf-8"))
     values = [ast.literal_eval(one.value) for one in tree.body if isinstance(one, ast.Assign) and _constant(one)]
-    assert {name: f"{name}{suffix}" for name in result.paths} in values and result.model in values
+    assert {name: f"{name}{suffix}" for name in result.solutions} in values and result.model in values
     source = find_source(f"{folder}:linear", options_of(f"{folder}:linear", (), ()))
-    again, path = open_source(source, None, None), result.paths["linear"]
+    again, path = open_source(source, None, None), result.solutions["linear"]
     assert again.load_factors == pytest.approx(path.load_factors)
     assert again.states[-1].displacement == pytest.approx(path.states[-1].displacement, rel=1e-12)
 

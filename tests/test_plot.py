@@ -243,10 +243,12 @@ def test_an_animation_has_a_frame_for_each_level(springs: ts.Solution, finite: t
     with pytest.raises(OutputError, match=r"the suffix of an animation is \.gif or \.mp4, not '\.avi'"):
         springs.animate(tmp_path / "springs.avi")
     surface = ts.read_stl(springs.problem, springs.write(tmp_path / "springs.stl"))
-    with pytest.raises(OutputError, match=r"needs two load levels or more, springs.stl has fewer"):
+    with pytest.raises(OutputError, match=r"needs two load levels or more that springs.stl has"):
         surface.animate(tmp_path / "surface.gif")
-    with pytest.raises(OutputError, match=r"needs two load levels or more, springs.stl has fewer"):
+    with pytest.raises(OutputError, match=r"needs two load levels or more that springs.stl has"):
         surface.animate(tmp_path / "surface.gif", color="displacement")
+    with pytest.raises(OutputError, match=r"two load levels or more that springs.* and springs.stl both have"):
+        springs.animate(tmp_path / "both.gif", over=surface, color="displacement")
     with pytest.raises(OutputError, match=r"magnify = '10': springs.stl is a surface"):
         springs.plot(over=surface, magnify="10")  # type: ignore[arg-type]
 

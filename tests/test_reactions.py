@@ -127,7 +127,7 @@ def test_a_support_acts_only_where_it_holds() -> None:
         ts.Fixed("right", fix=["x"], displacement=(0.006, 0, 0)),
     )
     found = solved(problem)
-    for path in found.paths.values():
+    for path in found.solutions.values():
         (one,) = path.support_forces(path.states[-1])
         assert one.name == "right" and one.has_force and not one.has_torque
         left = path.states[-1].reaction[problem.held[0].nodes, 0].sum()
@@ -166,7 +166,7 @@ def test_what_vanishes_by_symmetry_has_no_error(twisted: Result) -> None:
 
 def test_a_twist_is_judged_by_its_torque(twisted: Result) -> None:
     one = twisted.comparisons["neo"]
-    mine, theirs = (path.support_forces(path.states[-1])[0].torque for path in twisted.paths.values())
+    mine, theirs = (path.support_forces(path.states[-1])[0].torque for path in twisted.solutions.values())
     error = np.linalg.norm(mine - theirs) / np.linalg.norm(theirs)
     assert one.force_error == pytest.approx(error) and one.error == one.force_error > 0.2 > 10 * one.rms_error
     assert one.decided_by == "torque" and one.agrees_up_to_load_factor == 0.0

@@ -110,7 +110,7 @@ def result(
         title=title,
         file=FilePath(f"{stem}.toml"),
         problem=model.problem,
-        paths={name: model, **references},
+        solutions={name: model, **references},
         probe=probe,
         model=name,
         comparisons={key: ts.compare(model, one, probe, 0.05) for key, one in references.items()},
@@ -416,7 +416,7 @@ def words(figure: Sheet) -> dict[str, Any]:
 def test_figures_hold_every_spring_edge_and_the_probe(solved: Result) -> None:
     figures = draw_figures(solved)
     assert set(figures) == {"undeformed", "springs_over_linear", "springs_over_a-b", "curves", "error", "moduli"}
-    mesh, springs = solved.problem.mesh, solved.paths["springs"]
+    mesh, springs = solved.problem.mesh, solved.solutions["springs"]
     n_springs = 13 + 8  # edges of 4 x 1 squares, and two diagonals a square
     over = figures["springs_over_linear"]
     assert segments(over, "model") == n_springs
@@ -435,7 +435,7 @@ def test_curves_carry_the_name_of_the_law_and_the_numbers_of_the_path(solved: Re
     assert set(lines) == {"springs (lloyd)", "linear FEM", "Hencky FEM, a/b"}
     said = words(figure)
     assert {"springs (lloyd)", "linear FEM", "Hencky FEM", "a/b"} <= said.keys()
-    states = solved.paths["springs"].states
+    states = solved.solutions["springs"].states
     assert lines["springs (lloyd)"].get_ydata() == pytest.approx(
         [1e3 * state.displacement[solved.probe, 0] for state in states]
     )
@@ -750,7 +750,7 @@ def test_page_tells_verdict_law_advice_and_how_to_run_it_again(solved: Result) -
     assert told.index(verdict(solved)) < told.index("Errors at full load")
     for words in ("Hencky FEM a/b", "truespring verify soft.toml --out out", "scikit-fem", "1 element deep this mesh"):
         assert words in told
-    assert all(warning in told for path in solved.paths.values() for warning in path.warnings)
+    assert all(warning in told for path in solved.solutions.values() for warning in path.warnings)
 
 
 def test_page_and_summary_tell_how_a_path_was_solved_and_what_it_took(page_of: Callable[[Result], "Page"]) -> None:
@@ -817,8 +817,8 @@ def test_the_viewer_is_shown_before_it_is_drawn(solved: Result) -> None:
 
 
 def test_a_model_that_failed_shows_its_advice(solved: Result) -> None:
-    stopped = replace(solved.paths["springs"], status=ts.Status.NOT_CONVERGED)
-    page = Page(render_page([replace(solved, paths={**solved.paths, "springs": stopped})], ""))
+    stopped = replace(solved.solutions["springs"], status=ts.Status.NOT_CONVERGED)
+    page = Page(render_page([replace(solved, solutions={**solved.solutions, "springs": stopped})], ""))
     assert ts.Status.NOT_CONVERGED.advice in "".join(page.said)
 
 
@@ -826,11 +826,14 @@ def test_the_viewer_holds_the_positions_of_every_level(solved: Result) -> None:
     page = Page(render_page([solved], ""))
     data = page.data
     assert [one["name"] for one in data["paths"]] == ["springs", "linear", "a/b"]
-    assert data["paths"][0]["levels"] == solved.paths["springs"].load_factors.tolist()
-    clouds = [solved.problem.mesh.nodes, *(state.positions for one in solved.paths.values() for state in one.states)]
+    assert data["paths"][0]["levels"] == solved.solutions["springs"].load_factors.tolist()
+    clouds = [
+        solved.problem.mesh.nodes,
+        *(state.positions for one in solved.solutions.values() for state in one.states),
+    ]
     lower, upper = np.concatenate(clouds).min(axis=0), np.concatenate(clouds).max(axis=0)
     extent = (upper - lower).max()
-    for found, one in zip(data["paths"], solved.paths.values(), strict=True):
+    for found, one in zip(data["paths"], solved.solutions.values(), strict=True):
         for packed, state in zip(found["positions"], one.states, strict=True):
             steps = np.frombuffer(base64.b64decode(packed), dtype="<u2").reshape(-1, 2)
             assert lower + steps / 65535 * extent == pytest.approx(state.positions, abs=1e-5 * extent)

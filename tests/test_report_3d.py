@@ -94,7 +94,7 @@ def result(problem: ts.Problem, share: float = 1.1, references: Mapping[str, ts.
         title="A bar",
         file=FilePath("bar.toml"),
         problem=problem,
-        paths={"springs": springs, **others},
+        solutions={"springs": springs, **others},
         probe=probe,
         model="springs",
         comparisons={name: ts.compare(springs, other, probe, 0.05) for name, other in others.items()},
@@ -443,7 +443,7 @@ def test_the_scene_holds_surface_springs_and_positions() -> None:
     longest = max(data["box"])
     assert data["unit"] == "mm" and data["box"] == pytest.approx([80, 20 + 44, 40])
     lower = np.array([0, -0.044, 0])
-    for packed, state in zip(data["paths"][0]["positions"], found.paths["springs"].states, strict=True):
+    for packed, state in zip(data["paths"][0]["positions"], found.solutions["springs"].states, strict=True):
         steps = np.frombuffer(base64.b64decode(packed), dtype="<u2").reshape(-1, 3)
         places = lower + steps * (1e-3 * longest / 65535)
         assert places == pytest.approx(state.positions, abs=2e-6)
@@ -519,7 +519,7 @@ def test_the_bundle_is_part_of_pages_with_a_body_in_3d_alone(page_of: Callable[.
     both = scripts(page_of(result(body()), flat))
     assert [script == bundle().strip() for script in both] == [False, False, False, False, True, False, False]
     still = result(body(), references={})
-    still = replace(still, paths={"springs": path(body(), 1.0, levels=(0.0,), kind="springs", label="springs")})
+    still = replace(still, solutions={"springs": path(body(), 1.0, levels=(0.0,), kind="springs", label="springs")})
     assert len(scripts(page_of(still))) == 3  # nothing turns
 
 

@@ -42,7 +42,7 @@ def test_tables_are_those_of_the_solutions(pulled: Result) -> None:
     text = "\n".join(line for line in found["pulled_curves.csv"].decode().splitlines() if not line.startswith("#"))
     last = [row for row in csv.reader(io.StringIO(text)) if row and row[0] == "springs"][-1]
     moved, force = (float(last[column]) for column in (2, 4))
-    state = pulled.paths["springs"].states[-1]
+    state = pulled.solutions["springs"].states[-1]
     assert moved == pytest.approx(0.008)
     assert force == pytest.approx(state.reaction[pulled.problem.held[1].nodes, 0].sum())
 

@@ -371,7 +371,7 @@ solver = { load_steps = 1 }
 models = { fem = { kind = "fem", law = "linear" }, springs = { kind = "springs", rule = "biquadratic" } }
 """)
     result = run(read_study(tmp_path / "beam.toml"), comparing=False)
-    tip = {name: float(-path.states[-1].displacement[:, 2].min()) for name, path in result.paths.items()}
+    tip = {name: float(-path.states[-1].displacement[:, 2].min()) for name, path in result.solutions.items()}
     beam = 9e6 * 8**3 / (3 * 210e9 / 12)
     assert tip["fem"] == pytest.approx(beam, rel=0.02)
     assert tip["springs"] < 0.6 * beam

@@ -7,12 +7,15 @@ import shutil
 import subprocess
 import sys
 import threading
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import truespring as ts
+from tests.browser import CHROMIUM
 from truespring.cli.parser import VERBS
 from truespring.models import LAWS, RULES
 from truespring.study.schema import StudyKeys
@@ -91,23 +94,25 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @pytest.mark.verification
-def test_search_finds_gaussian_and_pages_fit_a_phone(address: str) -> None:
-    playwright = pytest.importorskip("playwright.sync_api")
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        pytest.skip("chromium is not installed")
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=chromium)
-        page = browser.new_page()
-        page.goto(f"{address}/search.html?q=gaussian")
-        page.wait_for_selector("#search-results li a")
-        titles = page.locator("#search-results li a").all_inner_texts()
-        assert any("Gaussian springs" in title for title in titles)
-        page.goto(f"{address}/search.html?q=nosuchwordanywhere")
-        page.wait_for_selector("#search-results p")
-        assert page.locator("#search-results li a").count() == 0
-        page.set_viewport_size({"width": 390, "height": 800})
-        for name in ("index", "start/own-body", "theory/springs", "reference/keys", "howto/pressure", "models"):
-            page.goto(f"{address}/{name}.html")
-            assert page.evaluate("document.documentElement.scrollWidth") <= 390, name
-        browser.close()
+def test_types_in_signatures_lead_to_their_pages(address: str) -> None:
+    """The strict build ignores types without a page; those of public names have one."""
+    with urllib.request.urlopen(f"{address}/reference/api/solve.html") as page:
+        links = set(re.findall(r'href="(\w+)\.html#truespring\.\w+"', page.read().decode("utf-8")))
+    assert {"Problem", "Solution"} <= links
+
+
+@pytest.mark.verification
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+def test_search_finds_gaussian_and_pages_fit_a_phone(address: str, browser: Any) -> None:
+    page = browser.new_page()
+    page.goto(f"{address}/search.html?q=gaussian")
+    page.wait_for_selector("#search-results li a")
+    titles = page.locator("#search-results li a").all_inner_texts()
+    assert any("Gaussian springs" in title for title in titles)
+    page.goto(f"{address}/search.html?q=nosuchwordanywhere")
+    page.wait_for_selector("#search-results p")
+    assert page.locator("#search-results li a").count() == 0
+    page.set_viewport_size({"width": 390, "height": 800})
+    for name in ("index", "start/own-body", "theory/springs", "reference/keys", "howto/pressure", "models"):
+        page.goto(f"{address}/{name}.html")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390, name

@@ -493,7 +493,7 @@ def test_the_table_has_the_figures_of_the_summary(swept: tuple[Path, dict[str, A
     folder, told, _ = swept
     (row,) = [one for one in told["rows"] if (one["mesh.elements"], one["material.poisson"]) == ([8, 2], 0.2)]
     result = run(read_study(folder / "study.toml", **{"material.poisson": 0.2}))
-    springs, one = result.paths["springs"], result.comparisons["linear"]
+    springs, one = result.solutions["springs"], result.comparisons["linear"]
     last = springs.states[-1]
     assert row["comparison.linear.rms_error"] == pytest.approx(one.rms_error, rel=1e-9)
     assert row["models.springs.energy"] == pytest.approx(last.energy, rel=1e-9)

@@ -177,7 +177,7 @@ def test_a_study_takes_it(tmp_path: Path) -> None:
     assert "Poisson's ratio is 0" in told["warnings"][0]
     result = run(study)
     assert result.converged
-    assert result.paths["springs"].kind == "terzopoulos"
+    assert result.solutions["springs"].kind == "terzopoulos"
     assert 0 < result.comparisons["linear"].rms_error < 0.5
 
 

@@ -1,6 +1,7 @@
 """Status and warnings of a solution: inverted, unstable and unbalanced states."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -70,6 +71,8 @@ def path_warnings(
     for state in states:
         if state.critical:
             warnings.append(_critical_warning(state))
+    if not keeps_to_stable:
+        warnings += _missed_points(states)
     unstable = [state for state in states if state.negative_eigenvalues]
     if unstable and keeps_to_stable:
         count = unstable[0].negative_eigenvalues
@@ -123,6 +126,17 @@ _BELOW_ROUNDING = (
     "the load is below rounding errors: it is too small for the stiffness and the coordinates of the body; apply a "
     "larger load, or place the body near the origin"
 )
+
+
+def _missed_points(states: tuple[State, ...]) -> Iterator[str]:
+    """Yield a warning for each change of stability whose critical point is not among the states."""
+    for last, there in pairwise(states):
+        before, after = last.negative_eigenvalues, there.negative_eigenvalues
+        if not (last.critical or there.critical or before is None or after is None) and before != after:
+            yield (
+                f"stability changes between load factors {last.load_factor:.6g} and {there.load_factor:.6g}, and the "
+                "critical point was not found: use more load_steps, a finer mesh or elements that do not lock"
+            )
 
 
 def _critical_warning(state: State) -> str:

@@ -127,7 +127,7 @@ def _case(
 def verify_each(
     cases: Sequence[Case],
     out: Path | None,
-    shown: Bars = nullcontext,
+    display: Bars = nullcontext,
     *,
     comparing: bool = True,
     timeout: float | None = None,
@@ -140,7 +140,7 @@ def verify_each(
     Args:
         cases: studies and other cases with distinct stems.
         out: folder for the results; None writes nothing.
-        shown: returns a context that shows the progress of a case.
+        display: returns a context that shows the progress of a case.
         comparing: whether to compare the models, and to write figures and reports.
         timeout: time limit [s] of each model and of the refinement of each reference.
         animate: whether to write animations.
@@ -150,10 +150,10 @@ def verify_each(
     results = []
     for case in cases:
         if out is None:
-            with shown() as advance:
+            with display() as advance:
                 found = run(case, advance, comparing, timeout), ""
         else:
-            found = _written(case, out, shown, comparing, timeout, animate)
+            found = _written(case, out, display, comparing, timeout, animate)
         results.append(found[0])
         yield found
     if comparing and out is not None:
@@ -162,7 +162,7 @@ def verify_each(
 
 
 def _written(
-    case: Case, out: Path, shown: Bars, comparing: bool, timeout: float | None, animate: bool
+    case: Case, out: Path, display: Bars, comparing: bool, timeout: float | None, animate: bool
 ) -> tuple[Result, str]:
     """Run a case and write its files; see `verify_each`. The files of each model are written when it is solved."""
     with writing(out):
@@ -173,7 +173,7 @@ def _written(
             write_model(path, opened, name, case.form)
 
     with opened:
-        with shown() as advance:
+        with display() as advance:
             result = run(case, advance, comparing, timeout, known)
         with writing(out):
             (out / "report.html").unlink(missing_ok=True)  # a report of an earlier command

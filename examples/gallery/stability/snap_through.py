@@ -16,8 +16,8 @@ span, rise = 1.0, 0.2  # half of the span, height [m]
 stiffness = 1e3  # of a bar [N/m]
 
 # %%
-# The displacement of the top is prescribed, so that the path goes on where the force
-# falls.
+# Displacement control prescribes the displacement of the top, since the force decreases
+# between the two limit points.
 nodes = np.array([[-span, 0.0], [0.0, rise], [span, 0.0]])
 truss = ts.SpringNetwork(
     nodes, springs=[[0, 1], [1, 2]], stiffness=[stiffness, stiffness]

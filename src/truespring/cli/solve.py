@@ -69,7 +69,7 @@ def print_failures(result: "Result", out: Path, shown: bool) -> None:
     from truespring.equilibrium import FINE
     from truespring.report.axis import axis_of
 
-    for name, path in result.paths.items():
+    for name, path in result.solutions.items():
         if path.status not in FINE:
             reached = f"reached {axis_of(result).exact(path.load_factor)}, written to {out / result.stem}"
             say(f"{result.stem}: model '{name}' is {path.status}; {reached}")

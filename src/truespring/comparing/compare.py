@@ -102,7 +102,7 @@ def _result(name: str, model: Solution, first: str, found: Comparison, from_file
         title=f"{name} against {first}",
         file=Path(re.sub(r"[^\w.-]+", "-", name)),
         problem=found.model.problem,
-        paths={name: paths[name], first: paths[first]},
+        solutions={name: paths[name], first: paths[first]},
         probe=found.probe,
         model=drawn,
         comparisons={other: replace(found, model=paths[drawn], reference=paths[other])},

@@ -144,5 +144,5 @@ def _load(full: str, written: str, between: str) -> Axis:
 
 def _by_displacement(result: Result) -> bool:
     """Return whether the displacement was controlled and the load factor is part of the solution."""
-    states = [state for path in result.paths.values() for state in path.states if not state.critical]
+    states = [state for path in result.solutions.values() for state in path.states if not state.critical]
     return any(state.level is not None and abs(state.level - state.load_factor) > 1e-9 for state in states)

@@ -49,7 +49,7 @@ def magnification(result: Result) -> float:
         return 1.0
     moved = [
         float(np.linalg.norm(state.displacement, axis=1).max())
-        for path in result.paths.values()
+        for path in result.solutions.values()
         for state in path.states
     ]
     return round_factor(max(moved, default=0.0) / float((mesh.upper - mesh.lower).max()))

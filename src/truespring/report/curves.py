@@ -20,11 +20,11 @@ def write_curves(result: Result, file: Path) -> None:
     with file.open("w", newline="", encoding="utf-8") as stream:
         table = csv.writer(stream)
         past = any(
-            state.critical or state.negative_eigenvalues for path in result.paths.values() for state in path.states
+            state.critical or state.negative_eigenvalues for path in result.solutions.values() for state in path.states
         )
         columns = ["model", "load_factor", *(f"u{axis}" for axis in axes), *(f"f{axis}" for axis in axes)]
         table.writerow([*columns, *(["state"] if past else [])])
-        for name, path in result.paths.items():
+        for name, path in result.solutions.items():
             for state in path.states:  # + 0.0 turns a negative zero into zero; unknown values stay empty
                 moved, force = state.displacement[result.probe], path.applied_force(state)
                 table.writerow(
@@ -57,7 +57,7 @@ def write_reactions(result: Result, file: Path) -> None:
         table = csv.writer(stream)
         columns = [*heads("u", axes, "m"), *heads("f", axes, "N"), *heads("m", torques, "N m")]
         table.writerow(["model", "load_factor", "support", "on", *columns, "compared"])
-        for name, path in result.paths.items():
+        for name, path in result.solutions.items():
             for state in path.states:
                 for one in path.support_forces(state):
                     moved = state.displacement[path.problem.held[one.support].nodes].mean(axis=0)

@@ -43,7 +43,7 @@ def size_words(mesh: Mesh) -> str:
 
 def _element_facts(result: Result) -> list[tuple[str, str]]:
     """Return the kinds of finite elements that are not linear ones."""
-    used = {path.element for path in result.paths.values()}
+    used = {path.element for path in result.solutions.values()}
     kinds = {
         "mean-dilatation": "mean dilatation, which does not lock in nearly incompressible material",
         "quadratic": "second order, with mid-side nodes",

@@ -90,14 +90,14 @@ _Named = tuple[str, Sheet, str]
 def _draw(result: Result) -> Iterator[_Named]:
     """Yield every figure; plots first, while a child process renders bodies in 3D."""
     bodies = _bodies_in_space(result) if result.problem.mesh.dim == 3 else lambda: _plane_bodies(result)
-    if any(len(path.states) > 1 for path in result.paths.values()):
+    if any(len(path.states) > 1 for path in result.solutions.values()):
         yield "curves", curves_figure(result), ""
         for name, sheet in support_figures(result):
             yield name, sheet, ""
     yield from _histories(result)
     if any(one.load_factors.size for one in result.comparisons.values()):
         yield "error", error_figure(result), ""
-    if any(path.moduli is not None for path in result.paths.values()):
+    if any(path.moduli is not None for path in result.solutions.values()):
         yield "moduli", moduli_figure(result), ""
     yield from bodies()
 
@@ -123,8 +123,8 @@ def _reels(result: Result) -> dict[str, Reel]:
 
 
 def _film(reel: Reel, images: Sequence[Image] = ()) -> Sheet:
-    model = reel.result.paths[reel.model].label
-    over = "" if reel.reference is None else f" over {reel.result.paths[reel.reference].label}"
+    model = reel.result.solutions[reel.model].label
+    over = "" if reel.reference is None else f" over {reel.result.solutions[reel.reference].label}"
     return sheet_of(reel, reel.levels, images, f"{model}{over}")
 
 

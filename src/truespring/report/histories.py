@@ -44,7 +44,7 @@ def _write(file: Path, columns: list[str], rows: Iterable[list[object]]) -> None
 
 
 def _states(result: Result) -> Iterable[tuple[str, Solution, State]]:
-    return ((name, path, state) for name, path in result.paths.items() for state in path.states)
+    return ((name, path, state) for name, path in result.solutions.items() for state in path.states)
 
 
 def _motion(result: Result) -> Iterable[list[object]]:

@@ -68,7 +68,7 @@ def node_fields(path: Solution, state: State) -> dict[str, Floats]:
             return found
         found["energy"] = _mean(mesh, spread.sums(energies["lines"]) / at_rest)
         section = path.problem.section
-        if "tension" in lines and (section is None or not section.moduli_words):  # not in plane strain
+        if "tension" in lines and (mesh.dim == 3 or (section is not None and section.free_thickness)):
             virial = spread.sums(_virial(spread.ends, lines["tension"], in_space(state.positions)).reshape(-1, 9))
             found["stress"] = von_mises(_mean(mesh, virial.reshape(-1, 3, 3) / now[:, None, None]))
     return found

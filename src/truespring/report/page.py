@@ -91,14 +91,14 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "more": [text for sentence in _SENTENCES if (text := sentence(result))],
         "converged": result.converged,
         "closest": display_name(result, nearest) if nearest else None,
-        "warnings": [(name, path.label, text) for name, path in result.paths.items() for text in path.warnings],
+        "warnings": [(name, path.label, text) for name, path in result.solutions.items() for text in path.warnings],
         "mesh_notes": result.problem.mesh.notes,
         "drawing_notes": sorted({drawing.note for drawing in drawings.values()} - {""}),
         "in_space": in_space,
         "coloured": any(distance_name(result, name) in pictures for name in result.comparisons),
         "stated": result.problem.stated,
-        "solved": any(path.potential is not None for path in result.paths.values()),
-        "too_large": in_space and moving is None and any(len(path.states) > 1 for path in result.paths.values()),
+        "solved": any(path.potential is not None for path in result.solutions.values()),
+        "too_large": in_space and moving is None and any(len(path.states) > 1 for path in result.solutions.values()),
         "facts": facts(result),
         "short": in_short(result),
         "note": result.note,
@@ -111,7 +111,7 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
             "curves",
             *_reactions(pictures),
             "tools",
-            *map(energies_name, result.paths),
+            *map(energies_name, result.solutions),
             "error",
         ],
         "viewer": moving,
@@ -123,8 +123,8 @@ def _study(result: Result, place: int, budget: int) -> dict[str, Any]:
         "support_title": support_title(result),
         "over_the_way": any(one.over_the_way for one in result.comparisons.values()),
         "comparisons": [_comparison_row(result, name) for name in result.comparisons],
-        "models": [_model_row(name, path, axis_of(result)) for name, path in result.paths.items()],
-        "moduli": [_moduli(result, name, path.moduli) for name, path in result.paths.items() if path.moduli],
+        "models": [_model_row(name, path, axis_of(result)) for name, path in result.solutions.items()],
+        "moduli": [_moduli(result, name, path.moduli) for name, path in result.solutions.items() if path.moduli],
         "own_errors": {name: own_errors(result, name) for name in result.comparisons} if result.standings else {},
         "moduli_note": _section_note(result.problem),
         "source": result.source,
@@ -148,7 +148,7 @@ def _reactions(pictures: Mapping[str, Any]) -> list[str]:
 
 def _films(result: Result) -> Iterator[str]:
     """Yield the names that film strips may have, the nearest reference first."""
-    names = sorted(result.paths, key=lambda name: name != result.closest)
+    names = sorted(result.solutions, key=lambda name: name != result.closest)
     yield from (film_name(result, name) for name in [*names, ""])
 
 
@@ -252,7 +252,7 @@ def _stability(path: Solution) -> str:
 
 
 def _moduli(result: Result, name: str, moduli: Moduli) -> dict[str, Any]:
-    path = result.paths[name]
+    path = result.solutions[name]
     return {
         "name": name,
         "label": path.label,

@@ -101,11 +101,11 @@ def _parts(result: Result, axis: Axis) -> Iterator[Part]:
     name = result.closest
     if name is not None:
         several = "the nearest reference, " if len(result.comparisons) > 1 else ""
-        reference = several + result.paths[name].label
+        reference = several + result.solutions[name].label
         yield Part(
             "model",
             result.comparisons[name].rms_error,
-            f"{result.paths[result.model].label} against {reference}{_alike(dynamics)}",
+            f"{result.solutions[result.model].label} against {reference}{_alike(dynamics)}",
             "a shorter step and more iterations do not reduce it",
         )
     if splits is None:
@@ -115,7 +115,7 @@ def _parts(result: Result, axis: Axis) -> Iterator[Part]:
     half += ", which are as far or farther from the exact motion" if dynamics.scheme == "euler" else ""
     yield Part("time step", splits.step, half, _finer(dynamics))
     few = dynamics.iterations
-    explicit = result.paths[result.model].newton_iterations == 0
+    explicit = result.solutions[result.model].newton_iterations == 0
     solved = "explicit steps, which are not iterated" if explicit else "steps are solved"
     yield Part(
         "solver",

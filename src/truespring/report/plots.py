@@ -45,7 +45,7 @@ def curves_figure(result: Result) -> Sheet:
     by_level = axis.moves or _is_balanced(result)
     styles = path_styles(result)
     forces, moves = {}, {}
-    for name, path in result.paths.items():
+    for name, path in result.solutions.items():
         if path.states:
             forces[name] = to.sign * np.array([path.applied_force(state)[to.axis] for state in path.states])
             forces[name] = axis.value(path.load_factors) if by_level else forces[name]
@@ -60,8 +60,8 @@ def curves_figure(result: Result) -> Sheet:
             *styles[name],
             label=_two_lines(result, name),
             strong=is_strong(result, name),
-            unstable=np.array([bool(state.negative_eigenvalues) for state in result.paths[name].states]),
-            critical=np.flatnonzero([bool(state.critical) for state in result.paths[name].states]),
+            unstable=np.array([bool(state.negative_eigenvalues) for state in result.solutions[name].states]),
+            critical=np.flatnonzero([bool(state.critical) for state in result.solutions[name].states]),
         )
         for name in forces
     ]
@@ -75,13 +75,13 @@ def curves_figure(result: Result) -> Sheet:
 
 def _is_balanced(result: Result) -> bool:
     """Return whether the force has no total: loads or reactions cancel, or are unknown for a path."""
-    forces = np.array([path.applied_force(path.states[-1]) for path in result.paths.values() if path.states])
+    forces = np.array([path.applied_force(path.states[-1]) for path in result.solutions.values() if path.states])
     if not np.isfinite(forces).all() or (not result.problem.stated and not forces.any()):
         return True
     if not result.problem.stated:
         return False
     if driven_by_motion(result):
-        leading = [_of_leading(path, path.states[-1]) for path in result.paths.values() if path.states]
+        leading = [_of_leading(path, path.states[-1]) for path in result.solutions.values() if path.states]
         return not any(one is not None and one.has_force for one in leading)
     force = result.problem.loading.full.force(result.problem.mesh.nodes)
     return float(np.abs(force.sum(axis=0)).max()) <= 1e-9 * float(np.abs(force).sum())
@@ -117,7 +117,7 @@ def error_figure(result: Result) -> Sheet:
     tolerance, end = 100 * result.tolerance, 1.02 * axis.span
     within = f"within {tolerance_percent(result.tolerance)}"
     curves.append(Curve(np.array([0, end]), np.full(2, tolerance), BLUE, (0, (4, 2)), "", within, strong=False))
-    who = result.paths[result.model].label if result.model else "the model"
+    who = result.solutions[result.model].label if result.model else "the model"
     area = plot(f"Error of {who} against each reference", axis.label, name_of_y, curves, to_right=end)
     area.add(Rectangle((0, 0), end, tolerance, color=BLUE, alpha=0.09, lw=0, zorder=0.5, gid="tolerance"))
     return area.sheet
@@ -289,7 +289,7 @@ def moduli_figure(result: Result) -> Sheet:
     styles = path_styles(result)
     several = [
         Known(display_name(result, name), path.moduli, *styles[name][:2])
-        for name, path in result.paths.items()
+        for name, path in result.solutions.items()
         if path.moduli is not None
     ]
     return young_figure(several, material_name(result))

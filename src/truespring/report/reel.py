@@ -58,11 +58,11 @@ class Reel:
     @property
     def mesh(self) -> Mesh:
         """The mesh of the model."""
-        return self.result.paths[self.model].problem.mesh
+        return self.result.solutions[self.model].problem.mesh
 
     def places(self, name: str, level: float) -> Floats | None:
         """Return the nodes of a path at a level in the coordinates of `view` [m]; None if the level is not known."""
-        return _places(self.result.paths[name], level, self.factor)
+        return _places(self.result.solutions[name], level, self.factor)
 
 
 def _places(path: Solution, level: float, factor: float) -> Floats | None:
@@ -72,7 +72,7 @@ def _places(path: Solution, level: float, factor: float) -> Floats | None:
 
 def shown_reference(result: Result) -> str | None:
     """Return the name of the path to draw with the model: the nearest reference, else another path that moves."""
-    others = [name for name, path in result.paths.items() if name != result.model and len(path.states) > 1]
+    others = [name for name, path in result.solutions.items() if name != result.model and len(path.states) > 1]
     preferred = [name for name in (result.closest, *result.comparisons) if name in others]
     return next(iter((*preferred, *others)), None)
 
@@ -82,8 +82,8 @@ def reel_of(result: Result, reference: str | None, most: int, from_rest: bool) -
 
     `from_rest`: whether the first level, that of the undeformed body, is one of them.
     """
-    model = result.model or next(iter(result.paths))
-    path, other = result.paths[model], None if reference is None else result.paths[reference]
+    model = result.model or next(iter(result.solutions))
+    path, other = result.solutions[model], None if reference is None else result.solutions[reference]
     if other is not None and other.problem.mesh.dim != path.problem.mesh.dim:
         reference = other = None
     known = [
@@ -150,8 +150,8 @@ def shots(reel: Reel, n_pictures: int, levels: Sequence[float], dpi: float = _DP
 def _shot(reel: Reel, level: float, size: tuple[int, int], dpi: float) -> Shot:
     mine = reel.places(reel.model, level)
     assert mine is not None  # reel_of
-    path = reel.result.paths[reel.model]
-    other = None if reel.reference is None else reel.result.paths[reel.reference]
+    path = reel.result.solutions[reel.model]
+    other = None if reel.reference is None else reel.result.solutions[reel.reference]
     theirs = None if reel.reference is None else reel.places(reel.reference, level)
     layers = over_layers(path, mine, other, theirs)
     return Shot(with_tools(layers, drawn_tools(path.problem, level)), reel.lower, reel.upper, size, dpi / 72)
@@ -216,11 +216,11 @@ def _draw(area: Area, reel: Reel, level: float, scale: Scale) -> None:
     theirs = None if reel.reference is None else reel.places(reel.reference, level)
     if mesh.dim == 2:
         if theirs is not None and reel.reference is not None:
-            _wires(area, theirs / size, path_lines(reel.result.paths[reel.reference]), INK, 1.2, "reference")
+            _wires(area, theirs / size, path_lines(reel.result.solutions[reel.reference]), INK, 1.2, "reference")
         if mine is not None:
-            _wires(area, mine / size, path_lines(reel.result.paths[reel.model]), BLUE, 0.75, "model")
+            _wires(area, mine / size, path_lines(reel.result.solutions[reel.model]), BLUE, 0.75, "model")
         draw_tools(area, drawn_tools(reel.result.problem, level), scale)
-    if mine is not None and reel.result.paths[reel.model].problem.mesh is reel.result.problem.mesh:
+    if mine is not None and reel.result.solutions[reel.model].problem.mesh is reel.result.problem.mesh:
         draw_dot(area, mine[reel.result.probe, :2] / size)
 
 

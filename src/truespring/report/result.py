@@ -45,7 +45,7 @@ class Result:
         title: title of the study.
         file: path of the study file, as given.
         problem: mesh, material, supports and loads.
-        paths: solution of each model, by its name, in the order of the study.
+        solutions: solution of each model, by its name, in the order of the study.
         probe: number of the watched node.
         model: name of the model that is compared with the others; None if nothing is compared.
         comparisons: by name of the reference.
@@ -78,7 +78,7 @@ class Result:
     title: str
     file: Path
     problem: Problem
-    paths: Mapping[str, Solution]
+    solutions: Mapping[str, Solution]
     probe: int
     model: str | None
     comparisons: Mapping[str, Comparison]
@@ -91,7 +91,7 @@ class Result:
     form: Form = "vtu"
 
     def __repr__(self) -> str:
-        return f"Result({self.stem}, {list(self.paths.values())})"
+        return f"Result({self.stem}, {list(self.solutions.values())})"
 
     def _repr_html_(self) -> str:
         """Return the result as HTML for a notebook: a table and a picture."""
@@ -113,11 +113,6 @@ class Result:
     def closest(self) -> str | None:
         """Name of the reference nearest to the model at full load."""
         return closest(self.comparisons)
-
-    @property
-    def solutions(self) -> Mapping[str, Solution]:
-        """The solution of each model, by its name: `paths`."""
-        return self.paths
 
     @property
     def comparison(self) -> Comparison | None:
@@ -143,4 +138,4 @@ class Result:
     @property
     def converged(self) -> bool:
         """Whether every solved path reached full load through stable equilibria."""
-        return all(path.status in FINE for path in self.paths.values())
+        return all(path.status in FINE for path in self.solutions.values())

@@ -32,7 +32,7 @@ def scene_nodes(result: Result, shown: Sequence[str]) -> Ints:
     kept |= result.problem.mesh.n_nodes <= _MOST_SOLID
     kept[result.probe] = True
     for name in shown:
-        for lines in _lines(result.paths[name]):
+        for lines in _lines(result.solutions[name]):
             kept[lines] = True
     return np.flatnonzero(kept)
 
@@ -94,7 +94,7 @@ def fields_in_scene(
     """
     known = [
         [node_fields(path, state) for level in levels if (state := path.at(level)) is not None]
-        for path in map(result.paths.__getitem__, shown)
+        for path in map(result.solutions.__getitem__, shown)
     ]
     fields, values = [], [dict[str, list[str]]() for _ in shown]
     steps = _FINE if len(FIELDS) * len(shown) * len(levels) * len(pack.nodes) <= _MANY else _COARSE
@@ -121,11 +121,11 @@ def _all_have(several: Sequence[Mapping[str, Floats]], name: str) -> bool:
 
 def path_in_scene(result: Result, name: str, states: Sequence[State], pack: Packing) -> dict[str, Any]:
     """Return a path's lines, and its distance from the model at each level as text."""
-    surface, inside = _lines(result.paths[name])
+    surface, inside = _lines(result.solutions[name])
     values: dict[str, Any] = {"lines": pack.pairs(surface), "inside": pack.pairs(inside), "most": []}
     if name == result.model or result.model is None:
         return values
-    model = result.paths[result.model]
+    model = result.solutions[result.model]
     pairs = [(model.at(state.level), state) for state in states]
     distances = [
         None if mine is None else float(np.linalg.norm(mine.displacement - state.displacement, axis=1).max())

@@ -47,8 +47,8 @@ def own_error_sentence(result: Result, called: dict[str, str]) -> str | None:
 
 def _who(result: Result, names: list[str], one: str, several: str) -> str:
     """Return the subject of a sentence: one reference by its label, several by their kind, with the verb."""
-    labels = {result.paths[name].label for name in names}
-    paths = [result.paths[name] for name in names]
+    labels = {result.solutions[name].label for name in names}
+    paths = [result.solutions[name] for name in names]
     if all(path.has_springs for path in paths):
         return f"springs on this mesh {several} themselves"
     who = labels.pop() if len(labels) == 1 else "FEM" if all(path.element for path in paths) else "each reference"

@@ -68,8 +68,8 @@ def error_colors(shares: Floats) -> Floats:
 
 def path_styles(result: Result) -> dict[str, tuple[str, Any, str]]:
     """Return colour, dashes and marker of each path: blues for springs and the compared model, black and greys else."""
-    springs = [name for name in result.paths if is_strong(result, name)]
-    others = [name for name in result.paths if name not in springs]
+    springs = [name for name in result.solutions if is_strong(result, name)]
+    others = [name for name in result.solutions if name not in springs]
     return {
         **{name: SPRING_STYLES[place % len(SPRING_STYLES)] for place, name in enumerate(springs)},
         **{name: _REFERENCE_STYLES[place % len(_REFERENCE_STYLES)] for place, name in enumerate(others)},
@@ -78,7 +78,7 @@ def path_styles(result: Result) -> dict[str, tuple[str, Any, str]]:
 
 def is_strong(result: Result, name: str) -> bool:
     """Return whether a path is drawn in blue: springs and the compared model."""
-    return name == result.model or result.paths[name].has_springs
+    return name == result.model or result.solutions[name].has_springs
 
 
 def full_name(result: Result, name: str) -> str:
@@ -88,6 +88,6 @@ def full_name(result: Result, name: str) -> str:
 
 def label_and_name(result: Result, name: str) -> tuple[str, ...]:
     """Return the label of a path, and its name in the study if the label does not contain it or is not unique."""
-    label = result.paths[name].label
-    alone = sum(path.label == label for path in result.paths.values()) == 1
+    label = result.solutions[name].label
+    alone = sum(path.label == label for path in result.solutions.values()) == 1
     return (label,) if alone and name.casefold() in label.casefold() else (label, name)

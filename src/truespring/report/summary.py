@@ -22,7 +22,7 @@ def summary(result: Result) -> dict[str, Any]:
         "title": result.title,
         "truespring": version("truespring"),
         "model": result.model,
-        "models": {name: _model(path, result.probe) for name, path in result.paths.items()},
+        "models": {name: _model(path, result.probe) for name, path in result.solutions.items()},
         "probe": {"node": result.probe, "position": result.problem.mesh.nodes[result.probe].tolist()},
         "comparison": {name: _comparison(one) | _standing(result, name) for name, one in result.comparisons.items()},
         "closest": result.closest,
@@ -167,7 +167,7 @@ def difference(result: Result) -> dict[str, Any]:
     Relative errors are those of the summary of a study; distances are in metres; unknown values are None.
     """
     (one,) = result.comparisons.values()
-    model, reference = result.paths  # in this order, whichever is drawn over the other
+    model, reference = result.solutions  # in this order, whichever is drawn over the other
     surfaces = one.hausdorff
 
     return {
@@ -205,7 +205,7 @@ def difference(result: Result) -> dict[str, Any]:
                 strict=True,
             )
         ],
-        "warnings": [f"{who}: {warning}" for who, path in result.paths.items() for warning in path.warnings],
+        "warnings": [f"{who}: {warning}" for who, path in result.solutions.items() for warning in path.warnings],
     }
 
 

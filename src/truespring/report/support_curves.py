@@ -32,7 +32,7 @@ def support_figures(result: Result) -> Iterator[tuple[str, Sheet]]:
         only_turned = held.turn is not None and not held.motion.any()
         is_total = problem.loading.driven_by_motion and held.turn is None and len(moved) == 1
         for quantity in ("torque", "force") if only_turned else ("force", "torque"):
-            values = {name: _values(path, support, quantity) for name, path in result.paths.items()}
+            values = {name: _values(path, support, quantity) for name, path in result.solutions.items()}
             if (is_total and quantity == "force") or not any(has for has, _, _ in values.values()):
                 continue
             number += 1

@@ -96,7 +96,7 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
     axis = axis_of(result)
     head = axis.label if axis.moves else "load"
     table = new_table(f"{result.stem}: {result.title}", "model", "", "status", head, "iterations", "seconds")
-    for name, path in result.paths.items():
+    for name, path in result.solutions.items():
         spent = (str(path.newton_iterations), f"{path.seconds:.2f}")
         table.add_row(name, path.label, str(path.status), axis.number(path.load_factor, 6), *spent)
     yield table
@@ -110,7 +110,7 @@ def result_tables(result: Result) -> "Iterator[Table | str]":
             yield supports
     for note in result.problem.mesh.notes:
         yield f"note: mesh: {note}"
-    for name, path in result.paths.items():
+    for name, path in result.solutions.items():
         for warning in path.warnings:
             yield f"warning: {name}: {warning}"
 

@@ -28,7 +28,7 @@ def energies_figure(result: Result, name: str) -> Sheet:
     """Return the energies of a path stacked over time, and the work done on the body, which is their sum."""
     from matplotlib.lines import Line2D
 
-    axis, path = axis_of(result), result.paths[name]
+    axis, path = axis_of(result), result.solutions[name]
     at, values, work = _energies(path)
     x = axis.value(at)
     low, high = _limits(result)
@@ -59,7 +59,7 @@ def _work_words(work: Floats) -> str:
 
 def moving(result: Result) -> list[str]:
     """Return the names of the paths whose energies are known over time."""
-    return [name for name, path in result.paths.items() if sum(one.moving is not None for one in path.states) > 1]
+    return [name for name, path in result.solutions.items() if sum(one.moving is not None for one in path.states) > 1]
 
 
 def _energies(path: Solution) -> tuple[Floats, dict[str, Floats], Floats]:
@@ -74,7 +74,7 @@ def _limits(result: Result) -> tuple[float, float]:
     """Return the lowest and highest value of the stacks and of the work of all paths [J]."""
     found = [0.0]
     for name in moving(result):
-        _, values, work = _energies(result.paths[name])
+        _, values, work = _energies(result.solutions[name])
         found += [float(work.min()), float(work.max())]
         for _, below, above in _stacked(values):
             found += [float(below.min()), float(above.max())]
@@ -102,7 +102,7 @@ def _fill(area: Area, x: Floats, below: Floats, above: Floats, color: str, name:
 
 def _energy_title(result: Result, name: str) -> str:
     title = f"Energies of {display_name(result, name)}"
-    taken = by_scheme(result.paths[name])
+    taken = by_scheme(result.solutions[name])
     if taken is None or abs(taken) < 1e-4:
         return title
     verb = "dissipated" if taken > 0 else "added"
@@ -111,7 +111,7 @@ def _energy_title(result: Result, name: str) -> str:
 
 def has_touches(result: Result) -> bool:
     """Return whether the forces on tools or grasps are known along the way."""
-    return any(len(path.states) > 1 and path.states[-1].touches for path in result.paths.values())
+    return any(len(path.states) > 1 and path.states[-1].touches for path in result.solutions.values())
 
 
 def tools_figure(result: Result) -> Sheet:
@@ -119,7 +119,7 @@ def tools_figure(result: Result) -> Sheet:
     axis, styles = axis_of(result), path_styles(result)
     names = [one.name for one in result.problem.touching]
     found = []
-    for name, path in result.paths.items():
+    for name, path in result.solutions.items():
         states = [state for state in path.states if len(state.touches) == len(names)]
         for number, tool in enumerate(names if states else ()):
             size = np.array([float(np.linalg.norm(state.touches[number].force)) for state in states])

@@ -66,5 +66,5 @@ def spring_lines(potential: object) -> Ints | None:
 
 def undeformed_of(result: Result) -> Undeformed:
     """Return the undeformed body of a result, with the springs of the compared or, without one, the first model."""
-    model = result.paths.get(result.model or "") or next(iter(result.paths.values()))
+    model = result.solutions.get(result.model or "") or next(iter(result.solutions.values()))
     return Undeformed(result.problem, result.probe, spring_lines(model.potential), model.lines, model.is_cloud)

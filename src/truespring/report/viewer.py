@@ -37,11 +37,11 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
     nodes = scene_nodes(result, shown) if mesh.dim == 3 else np.arange(mesh.n_nodes)
     if not shown:
         return None
-    levels = _levels(result.paths[shown[0]], budget // (mesh.dim * len(nodes) * len(shown)))
+    levels = _levels(result.solutions[shown[0]], budget // (mesh.dim * len(nodes) * len(shown)))
     if len(levels) < 2:
         return None
-    factor = 1.0 if any(_only_surface(result.paths[name]) for name in shown) else magnification(result)
-    first, *others = (_cloud(result.paths[name], factor) for name in shown)
+    factor = 1.0 if any(_only_surface(result.solutions[name]) for name in shown) else magnification(result)
+    first, *others = (_cloud(result.solutions[name], factor) for name in shown)
     inside = np.concatenate([mesh.nodes, first])
     around = _around(result, levels, inside) if mesh.dim == 2 else []  # in space the camera holds them
     lower, upper, leaves = picture_box(np.concatenate([inside, *around]), others)
@@ -62,7 +62,7 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
         "numbers": pack.numbers(nodes) if len(nodes) < mesh.n_nodes else "",
         "probe": pack.number(result.probe),
         "chosen": closest,
-        "start": _start(result.paths[shown[0]], levels),
+        "start": _start(result.solutions[shown[0]], levels),
         "rest": pack.places(mesh.nodes),
         "outline": pack.pairs(mesh.boundary if mesh.boundary.shape[1] == 2 else mesh.edges),
         "paths": [
@@ -81,9 +81,9 @@ def viewer(result: Result, budget: int) -> dict[str, Any] | None:
 def _shown(result: Result) -> list[str]:
     """Return the names of the paths to draw: the model, then its references; none if the model does not move."""
     order = [result.model] if result.model is not None else []
-    names = order + [name for name in result.paths if name not in order]
-    shown = [name for name in names if len(result.paths[name].states) > 1 or name != names[0]]
-    shown = [name for name in shown if result.paths[name].states or _only_surface(result.paths[name])]
+    names = order + [name for name in result.solutions if name not in order]
+    shown = [name for name in names if len(result.solutions[name].states) > 1 or name != names[0]]
+    shown = [name for name in shown if result.solutions[name].states or _only_surface(result.solutions[name])]
     return shown if shown and shown[0] == names[0] else []
 
 
@@ -155,7 +155,7 @@ def _path(
     result: Result, name: str, levels: Sequence[float], pack: Packing, factor: float, beyond: bool
 ) -> dict[str, Any]:
     """Return positions and text of a path by level; `beyond`: it leaves the picture; `factor`: magnification."""
-    path = result.paths[name]
+    path = result.solutions[name]
     to = drive(result)
     rest = path.problem.mesh.nodes
     states = [state for level in levels if (state := path.at(level)) is not None]

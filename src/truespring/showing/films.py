@@ -37,7 +37,8 @@ def animate(solution: Solution, file: Path, over: Solution | None, color: str | 
     states_of_both(pair)  # an error if they cannot be drawn together
     frames, colors = _frames(pair) if color is None else _colored_frames(pair, color)
     if len(frames) < 2:
-        raise OutputError(f"{file}: an animation needs two load levels or more, {solution.label} has fewer")
+        who = f"{solution.label} has" if over is None else f"{solution.label} and {over.label} both have"
+        raise OutputError(f"{file}: an animation needs two load levels or more that {who}")
     with writing_file(file):
         file.parent.mkdir(parents=True, exist_ok=True)
         if suffix == ".gif":

@@ -35,7 +35,7 @@ class Pair:
             title=name,
             file=_NO_FILE,
             problem=solution.problem,
-            paths=paths,
+            solutions=paths,
             probe=watched,
             model=name,
             comparisons=comparisons,

@@ -106,10 +106,10 @@ def _moduli(moduli: Moduli) -> Card:
 
 
 def _result(result: Result) -> Card:
-    found = (_result_row(result, name, path) for name, path in result.paths.items())
+    found = (_result_row(result, name, path) for name, path in result.solutions.items())
     columns = ("model", "", "status", "Newton iterations", "seconds", "error")
     nearest = result.comparison
-    path = next(iter(result.paths.values()))
+    path = next(iter(result.solutions.values()))
     picture = _pair(path, None) if nearest is None else _pair(nearest.model, nearest.reference)
     return Card(f"Result: {result.title}", (), verdict(result), columns, list(found), picture)
 

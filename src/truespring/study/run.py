@@ -62,7 +62,7 @@ def run(
         title=case.title,
         file=case.file,
         problem=case.problem,
-        paths=paths,
+        solutions=paths,
         probe=probe,
         model=case.model,
         comparisons={name: compare(model, paths[name], probe, case.tolerance) for name in names},

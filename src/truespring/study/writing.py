@@ -29,7 +29,7 @@ def write(result: Result, out: Path, report: bool = True, animate: bool = False)
     With `report` also figures and report.html, with `animate` animation.gif and, with imageio-ffmpeg, animation.mp4.
     """
     with output(result, out) as own:
-        for name, path in result.paths.items():
+        for name, path in result.solutions.items():
             write_model(path, own, name, result.form)
         write_rest(result, own, verify_command([result], out, animate), report, animate)
 
@@ -74,7 +74,7 @@ def write_rest(result: Result, output: Output, command: str | None, report: bool
 
 def _write_script(result: Result, folder: Path) -> None:
     """Write the script that opens the models with states in ParaView, deformed; nothing without any."""
-    names = {name: f"{name}{SERIES[result.form].suffix}" for name, path in result.paths.items() if path.states}
+    names = {name: f"{name}{SERIES[result.form].suffix}" for name, path in result.solutions.items() if path.states}
     if names:
         shown = result.model if result.model in names else next(iter(names))
         flat = result.problem.mesh.dim == 2

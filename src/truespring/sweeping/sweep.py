@@ -196,7 +196,7 @@ def solve_point(job: tuple[StudyText, Point], timeout: float | None = None) -> d
     _require_same_files(text, point)
     result = run(text.study(point.changes), timeout=timeout, refining=False)
     found = summary(result)
-    for name, path in result.paths.items():
+    for name, path in result.solutions.items():
         energy = path.states[-1].energy if path.states else math.nan
         found["models"][name]["energy"] = energy if math.isfinite(energy) else None
     return found

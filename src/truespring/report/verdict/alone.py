@@ -16,10 +16,10 @@ _CRITICAL = ("limit point", "bifurcation")
 def alone_sentences(result: Result) -> Iterator[str]:
     """Yield how far the model went, through which equilibria, and how far the probe moved."""
     if result.model is None:
-        done = sum(path.status in FINE for path in result.paths.values())
-        yield f"{done} of {len(result.paths)} models reached {full_level(result)}; nothing was compared."
+        done = sum(path.status in FINE for path in result.solutions.values())
+        yield f"{done} of {len(result.solutions)} models reached {full_level(result)}; nothing was compared."
         return
-    path = result.paths[result.model]
+    path = result.solutions[result.model]
     who, plural = subject(result)
     if path.status in FINE and axis_of(result).moves:
         were = "were" if plural else "was"

@@ -13,7 +13,7 @@ def mesh_sentence(result: Result) -> str | None:
     The moduli of the springs hold this error for the default elements and for bending along x, so it is given for
     bodies driven along y only.
     """
-    known = next((path.moduli for path in result.paths.values() if path.moduli is not None), None)
+    known = next((path.moduli for path in result.solutions.values() if path.moduli is not None), None)
     used = {one.reference.element for one in result.comparisons.values()}
     if known is None or known.depth is None or drive(result).axis != 1:
         return None

@@ -29,7 +29,7 @@ def cause_sentence(result: Result) -> str | None:
         and not one.over_the_way
         and one.rms_errors[-1] > _NO_CAUSE
     }
-    if not nonlinear or result.model is None or not result.paths[result.model].has_springs:
+    if not nonlinear or result.model is None or not result.solutions[result.model].has_springs:
         return None
     if result.problem.touching:  # the area of contact grows, too
         return None
@@ -43,7 +43,7 @@ def cause_sentence(result: Result) -> str | None:
         return f"{what}: most of it arises at large strain, to which springs and law respond differently."
     if errors[0] > 2 * errors[-1]:
         return f"{what}: the springs' stiffness is off from the start, and large strain hides it."
-    where = "bending stiffness" if _exact(result.paths[result.model]) else "moduli and bending stiffness"
+    where = "bending stiffness" if _exact(result.solutions[result.model]) else "moduli and bending stiffness"
     return f"{what}: most of it is there from the start, in the springs' {where} on this mesh."
 
 

@@ -58,7 +58,7 @@ def axis_name(vector: Floats) -> str:
 
 
 def _of_probe(result: Result) -> Drive:
-    path = next((path for path in result.paths.values() if path.states), None)
+    path = next((path for path in result.solutions.values() if path.states), None)
     moved = np.zeros((1, 1)) if path is None else np.array([one.displacement[result.probe] for one in path.states])
     return _largest(moved) if moved.any() else Drive(0, 1.0)
 

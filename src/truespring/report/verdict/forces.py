@@ -21,9 +21,9 @@ def force_sentence(result: Result) -> str | None:
     A force is positive along the displacement of its support, a torque about the axis of its rotation; a negative one
     holds the body back. Those at the last level; where displacements may return to zero, where they are largest.
     """
-    if result.model is None or not result.paths[result.model].states:
+    if result.model is None or not result.solutions[result.model].states:
         return None
-    model = result.paths[result.model]
+    model = result.solutions[result.model]
     state = model.states[-1]
     if result.problem.stated and result.problem.returns and moved_supports(result.problem):
         state = max(model.states, key=lambda one: sum(float(of.force @ of.force) for of in model.support_forces(one)))

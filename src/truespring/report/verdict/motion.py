@@ -24,7 +24,7 @@ def motion_sentences(result: Result) -> Iterator[str]:
         yield _largest_sentence(result, most)
     shown = [f"{one.name} {part_words(one)} ({one.against})" for one in parts]
     yield f"errors{_measured(result)} {axis_of(result).at_full}: {', '.join(shown)}."
-    taken = by_scheme(result.paths[result.model or ""])
+    taken = by_scheme(result.solutions[result.model or ""])
     if taken is not None and abs(taken) >= result.tolerance:
         did = "dissipated" if taken > 0 else "added"
         yield f"the scheme itself {did} {percent(abs(taken))} of the energy given to the body."

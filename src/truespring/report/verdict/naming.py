@@ -24,18 +24,18 @@ _CORNERS = {
 
 def display_name(result: Result, name: str) -> str:
     """Return the label of a path, followed by its name in the study if several paths have that label."""
-    label = result.paths[name].label
-    is_unique = sum(path.label == label for path in result.paths.values()) == 1
+    label = result.solutions[name].label
+    is_unique = sum(path.label == label for path in result.solutions.values()) == 1
     return label if is_unique else f"{label} ({name})"
 
 
 def subject(result: Result) -> tuple[str, bool]:
     """Return the name of the compared model as the subject of a sentence, and whether it is plural."""
     assert result.model is not None
-    path = result.paths[result.model]
+    path = result.solutions[result.model]
     if not path.has_springs:
         return display_name(result, result.model), False
-    several = sum(other.has_springs for other in result.paths.values()) > 1
+    several = sum(other.has_springs for other in result.solutions.values()) > 1
     return display_name(result, result.model) if several else "springs", True
 
 

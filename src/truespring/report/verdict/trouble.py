@@ -19,7 +19,7 @@ def trouble_sentences(result: Result) -> Iterator[str]:
 
 def path_trouble(result: Result, name: str) -> str | None:
     """Return what went wrong with a path; None if it reached full load through stable equilibria."""
-    path = result.paths[name]
+    path = result.solutions[name]
     axis = axis_of(result)
     who, plural = subject(result) if name == result.model else (display_name(result, name), False)
     match path.status:
