@@ -149,7 +149,7 @@ def test_a_bifurcation_is_found_or_a_warning_says_that_it_was_not(n: int) -> Non
     assert path.states[0].negative_eigenvalues == 0 and path.states[-1].negative_eigenvalues == 1
     points = critical(path, "bifurcation")
     missed = [warning for warning in path.warnings if warning.startswith("stability changes between load factors")]
-    assert len(points) + len(missed) == 1
+    assert len(points) + len(missed) == 1 and (points or n == 20)
     if points:
         assert 1.2 * points[0].load_factor == pytest.approx(1.0, abs=2e-3)
     else:
