@@ -126,6 +126,30 @@ def test_a_block_sticks_to_an_incline(length: float) -> None:
     assert 0 < crept < 1e-3 * np.sqrt(G * length * np.hypot(1, 0.5))
 
 
+def falling(
+    n: int, scheme: str, stiffness: float | None, contact: str = "penalty", tolerance: float = 1e-8
+) -> ts.Solution:
+    """A soft block that falls by 5 cm on a plane, in n steps; the stiffness of the contact is that over young."""
+    size, drop, young, duration = 0.1, 0.05, 2e4, 0.16
+    ground = ts.HalfSpace(
+        "ground",
+        (0.0, 1.0),
+        (0, -drop),
+        stiffness=None if stiffness is None else stiffness * young / size,
+        contact=contact,
+        width=0.1 * size,
+    )
+    problem = ts.Problem(
+        ts.rectangle((size, size), (2, 2)),
+        ts.Material(young, 0.3, density=1000.0),
+        ts.PlaneStress(size),
+        loads=[ts.Gravity((0.0, -G))],
+        tools=[ground],
+        dynamics=ts.Dynamics(duration, step=duration / n, scheme=scheme, record=duration / 40),
+    )
+    return ts.solve(problem, ts.Fem("neo-hookean"), ts.Newton(tolerance=tolerance))
+
+
 @pytest.mark.parametrize(
     ("scheme", "n", "contact"),
     [
@@ -136,28 +160,35 @@ def test_a_block_sticks_to_an_incline(length: float) -> None:
 )
 def test_a_body_falls_on_a_plane_and_keeps_its_energy(scheme: str, n: int, contact: str) -> None:
     """Kinetic and elastic energy, loads and contact keep their sum to 1e-3 m g h; the defect falls with the step."""
-    size, drop, young, duration = 0.1, 0.05, 2e4, 0.16
 
     def defect(n: int) -> float:
-        ground = ts.HalfSpace(
-            "ground", (0.0, 1.0), (0, -drop), stiffness=10 * young / size, contact=contact, width=0.1 * size
-        )
-        problem = ts.Problem(
-            ts.rectangle((size, size), (2, 2)),
-            ts.Material(young, 0.3, density=1000.0),
-            ts.PlaneStress(size),
-            loads=[ts.Gravity((0.0, -G))],
-            tools=[ground],
-            dynamics=ts.Dynamics(duration, step=duration / n, scheme=scheme, record=duration / 40),
-        )
-        path = ts.solve(problem, ts.Fem("neo-hookean"), ts.Newton(tolerance=1e-10))
-        fallen = problem.mass.sum() * G * drop
+        path = falling(n, scheme, 10.0, contact, tolerance=1e-10)
+        fallen = path.problem.mass.sum() * G * 0.05
         kept = [state.moving.energies for state in path.states]
         assert max(one.contact for one in kept) > 0.05 * fallen  # it touches
-        assert path.states[-1].displacement[:, 1].mean() > -0.9 * drop  # and rebounds
+        assert path.states[-1].displacement[:, 1].mean() > -0.9 * 0.05  # and rebounds
+        assert not path.warnings
         total = np.array([one.total for one in kept])
         return float(np.abs(total - total[0]).max()) / fallen
 
     coarse, fine = defect(n), defect(2 * n)
     assert fine < 1e-3
     assert fine < coarse / 3
+
+
+def test_a_motion_that_gains_energy_has_a_warning() -> None:
+    """Midpoint steps that are too long for the contact: kinetic, elastic, contact energy and that of the place grow."""
+    path = falling(40, "midpoint", None)
+    mass = path.problem.mass
+    total = [
+        float(mass @ (state.moving.velocity**2).sum(axis=1)) / 2
+        + state.energy
+        + state.moving.energies.contact
+        + float(mass @ state.displacement[:, 1]) * G
+        for state in path.states
+    ]
+    (warning,) = path.warnings
+    assert warning.startswith("the steps added up to ") and "scheme bdf2" in warning
+    assert float(warning.split()[5]) == pytest.approx(max(total), rel=5e-3)
+    assert max(total) > mass.sum() * G * 0.05  # more than it had at the begin
+    assert not falling(40, "bdf2", None).warnings

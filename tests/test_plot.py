@@ -100,6 +100,22 @@ def test_colours_stand_for_the_quantity(
         assert (least, most) == pytest.approx((0.0, known.max()))
 
 
+def test_stress_of_straight_springs_is_force_over_area(axes: Any) -> None:
+    strip = ts.Problem(
+        ts.rectangle((0.04, 0.01), (8, 2)),
+        ts.Material(young=1e4, poisson=1 / 3),
+        ts.PlaneStress(thickness=0.02),
+        supports=[ts.Fixed("left", ("x",)), ts.Fixed("bottom", ("y",))],
+        loads=[ts.Force("right", (0.1, 0.0))],
+    )
+    stretched = ts.solve(strip, ts.Springs("lloyd"))
+    stretched.plot(color="stress", ax=axes)
+    height = np.ptp(stretched.states[-1].positions[:, 1])
+    assert np.asarray(artist(axes, "colors").get_array()) == pytest.approx(0.1 / (0.02 * height), rel=1e-6)
+    (inset,) = [one for one in axes.child_axes if one.get_ylabel()]
+    assert inset.get_ylabel() == "von Mises stress of springs, mean at nodes [Pa]"
+
+
 def von_mises(stress: Any) -> Any:
     """By the formula in components."""
     xx, xy, xz, _, yy, yz, _, _, zz = stress.T

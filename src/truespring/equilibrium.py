@@ -305,7 +305,7 @@ def _above_rounding(problem: Problem, follow: Iterable[Equilibrium]) -> tuple[li
     The unbalanced force of that state is not small against the load: it is returned last, as not converged.
     """
     found: list[Equilibrium] = []
-    if problem.dynamics is not None:  # its residuals are those of steps, see `_of_motion`
+    if problem.dynamics is not None:  # its residuals are those of steps, see `soundness`
         return list(follow), False
     for one in follow:
         unbalanced = one.converged and one.residual > UNBALANCED and not problem.loading.vanishes(one.load_factor)

@@ -12,6 +12,8 @@ from truespring.solution import State, Status
 
 # A larger relative residual is reported; it occurs only under loads that are near rounding errors.
 _LOOSE = 1e-6
+# A motion that gains more than this share of its energy is reported.
+_GAINED = 0.02
 #: A state with a larger relative residual is no equilibrium: the unbalanced force is not small against the load.
 UNBALANCED = 1e-3
 
@@ -95,7 +97,7 @@ def path_warnings(
     if problem.dynamics is not None:
         reached = (*states, *([] if best is None else [best]))
         largest = max((state.residual for state in reached if state.load_factor > 0), default=0.0)
-        return (*warnings, *_of_motion(problem.dynamics, largest))
+        return (*warnings, *_fixed_iterations(problem.dynamics, largest), *_gained_energy(states))
     loose = max((state.residual for state in states if state.load_factor > 0), default=0.0)
     if loose > _LOOSE:
         warnings.append(f"balanced only to a relative residual of {loose:.1e}: the load is near rounding errors")
@@ -112,13 +114,26 @@ _NO_POTENTIAL = (
 )
 
 
-def _of_motion(dynamics: Dynamics, residual: float) -> Iterator[str]:
+def _fixed_iterations(dynamics: Dynamics, residual: float) -> Iterator[str]:
     """Yield a warning if the number of iterations is fixed; `residual` is the largest of the steps [-]."""
     if dynamics.iterations:
         several = "s" * (dynamics.iterations != 1)
         yield (
             f"{dynamics.iterations} iteration{several} a step, not converged: the largest relative residual is "
             f"{residual:.1e}"
+        )
+
+
+def _gained_energy(states: tuple[State, ...]) -> Iterator[str]:
+    """Yield a warning if a motion gained energy that nothing gave it, which is an error of the steps."""
+    energies = [state.moving.energies for state in states if state.moving is not None]
+    stored = max((one.kinetic + one.elastic + one.contact for one in energies), default=0.0)
+    gained = max((-one.numerical for one in energies), default=0.0)
+    if gained > _GAINED * stored:
+        share = 100 * gained / stored
+        yield (
+            f"the steps added up to {gained:.3g} J to the energy of the motion, {share:.2g} % of the largest kinetic, "
+            "elastic and contact energy: use a shorter step, or the scheme bdf2"
         )
 
 

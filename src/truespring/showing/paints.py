@@ -9,7 +9,7 @@ import numpy as np
 from truespring.arrays import Floats, Ints
 from truespring.errors import OutputError, nearest, shown
 from truespring.potential import Visible
-from truespring.report.nodal import in_order, von_mises
+from truespring.report.nodal import in_order, node_fields, von_mises
 from truespring.showing.pairs import Pair
 from truespring.solution import Solution, State
 
@@ -120,12 +120,15 @@ def _tension(pair: Pair, state: State) -> Paint | None:
 
 
 def _stress(pair: Pair, state: State) -> Paint | None:
-    """Von Mises stress of the elements, of their true stress."""
+    """Von Mises stress of the elements, of their true stress; where springs alone carry it, of their virial stress."""
     solution = pair.solution
     fields = _element_fields(solution, state)
-    if "stress" not in fields:
+    if "stress" in fields:
+        return Paint("von Mises stress", "Pa", "elements", von_mises(fields["stress"].reshape(-1, 3, 3)))
+    at_nodes = node_fields(solution, state)
+    if "stress" not in at_nodes:
         return None
-    return Paint("von Mises stress", "Pa", "elements", von_mises(fields["stress"].reshape(-1, 3, 3)))
+    return Paint("von Mises stress of springs, mean at nodes", "Pa", "nodes", at_nodes["stress"])
 
 
 def _line_fields(solution: Solution, state: State) -> tuple[Ints, dict[str, Floats]]:

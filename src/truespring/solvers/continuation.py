@@ -37,8 +37,11 @@ _NO_DIRECTION = (
 )
 # The load does not move the controlled displacement if the first step would move the body by this multiple of its size.
 _FAR = 100.0
-# If no equilibrium is found at a critical point, a state this near stands for it, as a share of the step.
-_NEAR = 1e-5
+# If no equilibrium is found at a critical point, the nearest state stands for it if its eigenvalue is below this share
+# of those at the ends of the step: where the tangent is nearly singular, rounding errors move the body along the mode.
+_NEAR = 1e-2
+# Number of bisections towards such a point.
+_BISECTIONS = 6
 
 # Accuracy of the position of a critical point, as a share of the step.
 _PLACE = 1e-12
@@ -388,6 +391,55 @@ def _corrected(balance: Balance, start: Equilibrium, constraint: _Constraint, ah
         return watch.failure()
 
 
+class _Crossing:
+    """The eigenvalue nearest to zero over the share of a step at which stability changes."""
+
+    def __init__(self, balance: Balance, last: Found, there: Found, weights: Floats) -> None:
+        """Store the ends of the step, and the weights of the constraint between them, shape (n_nodes, dim)."""
+        self._balance, self._ends, self._weights = balance, (last.state, there.state), weights
+        self._targets = [float((weights * (one.positions - balance.potential.nodes)).sum()) for one in self._ends]
+        self._found: dict[float, tuple[Equilibrium, float]] = {}
+        self._limit = _NEAR * max(abs(self(0.0)), abs(self(1.0)))
+
+    def __call__(self, share: float) -> float:
+        """Return the eigenvalue at a share [N/m], positive before the critical point.
+
+        Zero where the tangent is singular, or so nearly that no equilibrium is found. Raises ArithmeticError if none is
+        found farther away.
+        """
+        state = self._ends[int(share)] if share in (0.0, 1.0) else self._between(share)
+        if state.converged:
+            singular = state.negative_eigenvalues is None
+            size = 0.0 if singular else _nearest_to_zero(self._balance, state)[0]
+            self._found[share] = state, size
+            return size if state.negative_eigenvalues == self._ends[0].negative_eigenvalues else -size
+        if self._found[self._nearest(share)][1] > self._limit:
+            raise ArithmeticError("no equilibrium was found between two states of the path")
+        return 0.0
+
+    def state(self, share: float) -> Equilibrium:
+        """Return the equilibrium at a share; if there is none, the nearest that is found by bisection towards it."""
+        self(share)
+        near, far = self._nearest(share), share
+        for _ in range(0 if near == share else _BISECTIONS):
+            middle = (near + far) / 2
+            self(middle)
+            near, far = (middle, far) if middle in self._found else (near, middle)
+        return self._found[near][0]
+
+    def _between(self, share: float) -> Equilibrium:
+        """Return the equilibrium at a share by Newton's method, or the state of least residual."""
+        (last, there), balance = self._ends, self._balance
+        guess = (1 - share) * last.positions + share * there.positions
+        factor = (1 - share) * last.load_factor + share * there.load_factor
+        target = (1 - share) * self._targets[0] + share * self._targets[1]
+        start = replace(last, positions=guess, load_factor=factor)
+        return _corrected(balance, start, _Constraint(self._weights, 0.0, target)).state
+
+    def _nearest(self, share: float) -> float:
+        return min(self._found, key=lambda known: abs(known - share))
+
+
 def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> Iterator[Equilibrium]:
     """Yield the critical point between two states if the number of negative eigenvalues changes."""
     from scipy.optimize import brentq  # imported here: it takes a quarter of a second
@@ -395,35 +447,11 @@ def _critical(balance: Balance, last: Found, there: Found, weights: Floats) -> I
     before, after = last.state.negative_eigenvalues, there.state.negative_eigenvalues
     if before is None or after is None or before == after or not there.state.converged:
         return
-    nodes = balance.potential.nodes
-    ends = [float((weights * (one.state.positions - nodes)).sum()) for one in (last, there)]
-    found: dict[float, Found] = {}
-
-    def crossing(share: float) -> float:
-        """Return the eigenvalue nearest to zero at a share of the step, positive before the critical point."""
-        if share in (0.0, 1.0):
-            one = (last, there)[int(share)]
-        else:
-            guess = (1 - share) * last.state.positions + share * there.state.positions
-            factor = (1 - share) * last.state.load_factor + share * there.state.load_factor
-            start = replace(last.state, positions=guess, load_factor=factor)
-            one = _corrected(balance, start, _Constraint(weights, 0.0, (1 - share) * ends[0] + share * ends[1]))
-        if not one.state.converged:
-            if min(abs(share - known) for known in found) > _NEAR:
-                raise ArithmeticError("no equilibrium was found between two states of the path")
-            return 0.0  # too near the critical point for the solver: it is the critical point
-        found[share] = one
-        if one.state.negative_eigenvalues is None:  # the tangent is singular: a critical point
-            return 0.0
-        size = _nearest_to_zero(balance, one.state)[0]
-        return size if one.state.negative_eigenvalues == before else -size
-
     try:
-        share = brentq(crossing, 0.0, 1.0, xtol=_PLACE, rtol=1e-12)
-        crossing(share)
+        crossing = _Crossing(balance, last, there, weights)
+        state = crossing.state(brentq(crossing, 0.0, 1.0, xtol=_PLACE, rtol=1e-12))
     except (ArithmeticError, SingularMatrixError, ValueError):
         return  # not found: the solution has a warning, as its stability changes
-    state = found[min(found, key=lambda known: abs(known - share))].state
     mode = _nearest_to_zero(balance, state)[1]
     push = _push(balance, state.positions, state.load_factor)
     part = abs(float((mode * push).sum())) / max(norm(mode) * norm(push), np.finfo(float).tiny)
