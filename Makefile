@@ -85,7 +85,7 @@ petsc: .venv/petsc
 	touch $@ .venv/demo
 
 .venv/petsc: .venv/test
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'setuptools<81' 'cython<3.1' 'mpi4py>=4'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'setuptools>=70.1,<81' 'cython<3.1' 'mpi4py>=4'
 	PETSC_DIR=$(PETSC_DIR) PETSC_ARCH= $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps petsc4py==$(PETSC4PY)
 	touch $@
 

@@ -174,7 +174,7 @@ class Nested:
         """
         if not positive:
             return None
-        if self._hierarchy is None or tangent.columns is not self._columns:
+        if self._hierarchy is None or not np.array_equal(tangent.columns, self._columns):
             self._hierarchy = self._allocated(tangent)
             self._columns = tangent.columns
         finer = tangent
