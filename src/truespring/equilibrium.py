@@ -102,7 +102,9 @@ def solve(
             if not ranks.is_on_all(error):
                 raise OneProcessError(error_words(error)) from error
             raise
-        return _logged(replace(path, seconds=time.perf_counter() - started - compiled(), moduli=moduli))
+        seconds = time.perf_counter() - started - compiled()
+        warnings = (*model.warnings(problem), *path.warnings)
+        return _logged(replace(path, seconds=seconds, moduli=moduli, warnings=warnings))
 
 
 def _logged(path: Solution) -> Solution:
@@ -171,7 +173,7 @@ def check_solver(problem: Problem, solver: Solver) -> None:
 
 
 def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | None, ranks: Communicator) -> Solution:
-    """Return the solution of a model that has a potential, without its time and moduli."""
+    """Return the solution of a model that has a potential, without its time, moduli and findings about the model."""
     alone = ranks.size == 1
     potential = model.potential(problem) if alone else Piecewise(model, problem, ranks)
     if potential.nodes.shape != problem.mesh.nodes.shape and not isinstance(potential, Refined):
@@ -210,7 +212,6 @@ def _solve(problem: Problem, model: Model, solver: Solver, report: Reporter | No
         states=states,
         status=Status.NOT_CONVERGED if broken else path_status(problem, states, best, model.finite, stable),
         warnings=(
-            *model.warnings(problem),
             *broken,
             *path_warnings(problem, states, best, model.finite, stable, below_rounding, loading.symmetric),
             *([model.limit] if best is not None and model.limit else ()),

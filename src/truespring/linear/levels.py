@@ -161,6 +161,8 @@ def product_pattern(n_rows: int, n_columns: int, *factors: ShortInts) -> tuple[S
 
 def inverse_of(matrix: Matrix) -> Floats:
     """Return the inverse of a small matrix, zero on its kernel and in held directions, shape (n k, n k)."""
+    from truespring.kernels.threads import one_blas_thread
+
     n, size = matrix.held.shape
     rows = np.repeat(np.arange(n), np.diff(matrix.starts))
     whole = np.zeros((n, n, size, size))
@@ -168,6 +170,7 @@ def inverse_of(matrix: Matrix) -> Floats:
     dense = whole.transpose(0, 2, 1, 3).reshape(n * size, n * size)
     held = matrix.held.ravel()
     dense[held] = dense[:, held] = 0.0
-    values, vectors = np.linalg.eigh((dense + dense.T) / 2)
-    kept = values > _KERNEL * values[-1]
-    return np.ascontiguousarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T)
+    with one_blas_thread():
+        values, vectors = np.linalg.eigh((dense + dense.T) / 2)
+        kept = values > _KERNEL * values[-1]
+        return np.ascontiguousarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T)

@@ -23,7 +23,11 @@ def stretch(lines: Ints, nodes: Floats, positions: Floats) -> Floats:
 
 def lengths(lines: Ints, positions: Floats) -> Floats:
     """Return the lengths of lines [m], shape (n,); `lines` are node numbers, shape (n, 2)."""
-    return np.asarray(np.linalg.norm(positions[lines[:, 1]] - positions[lines[:, 0]], axis=1))
+    squares = np.zeros(len(lines))
+    for column in positions.T.copy():  # one after the other: several times as fast as by rows
+        apart = column[lines[:, 1]] - column[lines[:, 0]]
+        squares += apart * apart
+    return np.sqrt(squares)
 
 
 def beside(lines: Mapping[str, Floats], elements: Mapping[str, Floats]) -> dict[str, Floats]:

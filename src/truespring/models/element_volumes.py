@@ -3,7 +3,7 @@
 import sys
 from collections import defaultdict
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import combinations, permutations
 from math import factorial
 from typing import Any, NamedTuple
@@ -66,23 +66,8 @@ class ElementVolumes:
     @cached_property
     def turns(self) -> Turns:
         """The terms of the second derivatives of an element's volume."""
-        simplices, weight = self.form
-        k, found = self.elements.shape[1], defaultdict[tuple[int, int, int], float](float)
-        for simplex in simplices:
-            for left_out, three in enumerate(combinations(simplex, 3)):
-                # det of the edges from the first of four = the sum of det of the faces' corners, signs alternating
-                sign = 1.0 if len(simplex) == 3 or left_out in (1, 3) else -1.0
-                for order in permutations(range(3)):
-                    a, b, c = (int(three[i]) for i in order)
-                    even = (order[1] - order[0]) % 3 == 1
-                    if len(simplex) == 4:
-                        found[a, b, c] += weight * sign * (1.0 if even else -1.0)
-                    else:
-                        found[a, b, 0] += weight * (1.0 if even else -1.0)
-        terms = sorted(key for key, value in found.items() if abs(value) > weight / 2)
-        pairs = [a * k + b for a, b, _ in terms]
-        starts = np.searchsorted(pairs, np.arange(k * k + 1)).astype(np.int32)
-        return Turns(starts, np.array([c for *_, c in terms], np.int32), np.array([found[key] for key in terms]))
+        turns = _unit_turns(self.problem.mesh.kind.simplices, self.elements.shape[1])
+        return turns._replace(coefficients=self.form[1] * turns.coefficients)
 
     @cached_property
     def _road(self) -> tuple[Any, tuple[Any, ...]]:
@@ -119,3 +104,24 @@ class ElementVolumes:
         known = (writable(positions), self.elements, *form, self.rows)
         run(kernel, n, *known, slope, volume, smallest=_SMALLEST_PIECE)
         return slope, volume
+
+
+@cache
+def _unit_turns(simplices: tuple[tuple[int, ...], ...], k: int) -> Turns:
+    """Return the terms of an element of `k` nodes, whose volume is the sum of the determinants of its simplices."""
+    found = defaultdict[tuple[int, int, int], float](float)
+    for simplex in simplices:
+        for left_out, three in enumerate(combinations(simplex, 3)):
+            # det of the edges from the first of four = the sum of det of the faces' corners, signs alternating
+            sign = 1.0 if len(simplex) == 3 or left_out in (1, 3) else -1.0
+            for order in permutations(range(3)):
+                a, b, c = (int(three[i]) for i in order)
+                even = (order[1] - order[0]) % 3 == 1
+                if len(simplex) == 4:
+                    found[a, b, c] += sign * (1.0 if even else -1.0)
+                else:
+                    found[a, b, 0] += 1.0 if even else -1.0
+    terms = sorted(key for key, value in found.items() if value)
+    pairs = [a * k + b for a, b, _ in terms]
+    starts = np.searchsorted(pairs, np.arange(k * k + 1)).astype(np.int32)
+    return Turns(starts, np.array([c for *_, c in terms], np.int32), np.array([found[key] for key in terms]))

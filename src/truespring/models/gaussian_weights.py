@@ -96,6 +96,8 @@ def laplacians(problem: Problem, hourglass: Floats, along: Floats | None = None)
 
 def _numbered(rows: Floats) -> Ints:
     """Return the number of each row among the distinct ones, shape (n,)."""
+    if (rows == rows[:1]).all():
+        return np.zeros(len(rows), dtype=np.int64)
     return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1]).ravel()
 
 

@@ -1,5 +1,6 @@
 """Reference elements: derivatives of the shape functions and weights at the Gauss points."""
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,6 +52,7 @@ class Reference(NamedTuple):
     weights: Floats
 
 
+@cache
 def reference_element(kind: str, element: str | None = None, order: int | None = None) -> Reference:
     """Return the reference element of a kind: of first order, or scikit-fem's `element` with quadrature of `order`.
 
