@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 #: The study, and the size of the page and of the film in pixels.
 STUDY, PAGE, FILM = ROOT / "examples" / "organ.toml", (1100, 760), (720, 497)
 #: Where the body is pulled, as shares of the canvas, and how far, in pixels.
-FROM, BY = (0.40, 0.70), (-110, 40)
+FROM, BY = (0.40, 0.70), (-70, 30)
 #: Time between pictures [s], pictures while it is pulled, held still and let go.
 EACH, PULLED, HELD, FREE = 0.1, 18, 60, 22
 FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -69,7 +69,9 @@ def main() -> None:
             page = browser.new_page(viewport={"width": PAGE[0], "height": PAGE[1]})
             page.goto(address(session))
             page.wait_for_selector("canvas")
-            time.sleep(6)
+            time.sleep(3)
+            page.get_by_label("Gravity").uncheck()  # with it a few voxels are inverted before any pull
+            time.sleep(12)
             pictures = filmed(page)
             browser.close()
     finally:
