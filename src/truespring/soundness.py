@@ -129,7 +129,7 @@ def _gained_energy(states: tuple[State, ...]) -> Iterator[str]:
     energies = [state.moving.energies for state in states if state.moving is not None]
     stored = max((one.kinetic + one.elastic + one.contact for one in energies), default=0.0)
     gained = max((-one.numerical for one in energies), default=0.0)
-    if gained > _GAINED * stored:
+    if stored and gained > _GAINED * stored:
         share = 100 * gained / stored
         yield (
             f"the steps added up to {gained:.3g} J to the energy of the motion, {share:.2g} % of the largest kinetic, "
